@@ -1,0 +1,22 @@
+# Every third-party library, found once. The capture side needs only the first block.
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(tl-expected REQUIRED)
+find_package(tomlplusplus REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(OpenSSL REQUIRED)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs)
+
+if(SCAN_RECONSTRUCTION)
+  find_package(TBB REQUIRED)
+  find_package(Ceres REQUIRED)
+  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs calib3d)
+endif()
+
+if(SCAN_TESTS)
+  find_package(GTest REQUIRED)
+endif()

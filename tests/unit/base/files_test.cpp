@@ -1,0 +1,49 @@
+#include "drivers/base/files.h"
+
+#include <gtest/gtest.h>
+
+#include "drivers/base/sha256.h"
+#include "tests/support/temp_folder.h"
+
+namespace scan {
+namespace {
+
+TEST(Files, WritesWholeAndReadsBack) {
+  TempFolder folder;
+  ASSERT_TRUE(WriteFileDurably(folder.path() / "a.txt", std::string_view("one")));
+  ASSERT_TRUE(WriteFileDurably(folder.path() / "a.txt", std::string_view("two")));
+  EXPECT_EQ(ReadTextFile(folder.path() / "a.txt").value(), "two");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(Files, MissingFilesAndFoldersAreBadInput) {
+  TempFolder folder;
+  EXPECT_EQ(ReadTextFile(folder.path() / "none").error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(ReadTextFile(folder.path()).error().kind, ErrorKind::bad_input);
+}
+
+TEST(Files, AnUnwritablePlaceIsAnErrorAndLeavesNothing) {
+  EXPECT_FALSE(WriteFileDurably("/proc/none/x", std::string_view("x")));
+}
+
+TEST(Files, OutputFolderIsNotOverwrittenWithoutForce) {
+  TempFolder folder;
+  const auto out = folder.path() / "out";
+  EXPECT_TRUE(PrepareOutputFolder(out, false));
+  EXPECT_TRUE(PrepareOutputFolder(out, false)) << "an empty folder may be used";
+  ASSERT_TRUE(WriteFileDurably(out / "x", std::string_view("x")));
+  EXPECT_EQ(PrepareOutputFolder(out, false).error().kind, ErrorKind::bad_input);
+  EXPECT_TRUE(PrepareOutputFolder(out, true));
+  EXPECT_FALSE(PrepareOutputFile(out / "x", false));
+  EXPECT_FALSE(PrepareOutputFile(out, true)) << "a folder is never replaced by a file";
+}
+
+TEST(Files, Sha256OfTheEmptyStringAndOfAbc) {
+  EXPECT_EQ(Sha256Hex(AsBytes("")),
+            "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(Sha256Hex(AsBytes("abc")),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+}  // namespace
+}  // namespace scan
