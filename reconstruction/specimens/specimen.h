@@ -1,0 +1,40 @@
+// Synthetic specimens with known truth: shape, interior and colour from implicit functions.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/base/result.h"
+#include "reconstruction/mesh/mesh.h"
+
+namespace scan {
+
+// Model frame, mm; the specimen stands along +z (its lowest point near z = bounds.low.z), about
+// 30 mm large. Thread contract: const calls from any thread.
+class Specimen {
+ public:
+  virtual ~Specimen() = default;
+  virtual std::string_view name() const = 0;
+  // Negative inside, positive outside; a lower bound of the distance, exact near the surface to
+  // first order.
+  virtual double SignedDistance(const Eigen::Vector3d& p) const = 0;
+  // Linear-light RGB albedo in [0, 1] of a surface point; varies everywhere.
+  virtual Eigen::Vector3d Albedo(const Eigen::Vector3d& p) const = 0;
+  // Material density in [0, 1] (0 air, 1 densest): the interior that CT shows.
+  virtual double Density(const Eigen::Vector3d& p) const = 0;
+  virtual BoundingBox Bounds() const = 0;
+};
+
+// beetle, orchid, mushroom, tomato (an exact body of revolution), tomato-stalk (bent stalk).
+std::vector<std::string> SpecimenNames();
+// Errors: bad_input for an unknown name.
+Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name);
+
+// The exact surface as a fine mesh: vertices lie on SignedDistance = 0 to 1e-4 mm, edges about
+// `edge_mm` long, closed and outward.
+TriangleMesh ExactSurface(const Specimen& specimen, double edge_mm);
+
+}  // namespace scan
