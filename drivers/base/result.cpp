@@ -8,7 +8,8 @@ std::string ToString(const Error& error) {
   std::string line = error.what;
   if (!error.where.empty()) line += ": " + error.where;
   if (!error.mend.empty()) line += "; " + error.mend;
-  std::replace_if(line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   return line;
 }
 

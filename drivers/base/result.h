@@ -60,8 +60,8 @@ int ExitCode(const Error& error);
   declaration = std::move(*holder)
 
 // SCAN_CHECK(WriteFile(...));  returns the error of a Status or Result whose value is not needed.
-#define SCAN_CHECK(expression)                                                                  \
-  do {                                                                                          \
-    if (auto scan_check = (expression); !scan_check)                                            \
-      return tl::unexpected<::scan::Error>(std::move(scan_check).error());                      \
+#define SCAN_CHECK(expression)                                             \
+  do {                                                                     \
+    if (auto scan_check = (expression); !scan_check)                       \
+      return tl::unexpected<::scan::Error>(std::move(scan_check).error()); \
   } while (false)

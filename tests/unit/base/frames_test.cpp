@@ -10,13 +10,14 @@ namespace scan {
 namespace {
 
 template <class A, class B>
-concept Composable = requires(A a, B b) { a* b; };
+concept Composable = requires(A a, B b) {
+  a* b;
+};
 
 TEST(Frames, OnlyMatchingFramesCompose) {
   static_assert(Composable<CameraFromTable, TableFromModel>);
   static_assert(!Composable<CameraFromTable, CameraFromModel>);
-  static_assert(
-      std::is_same_v<decltype(CameraFromTable() * TableFromModel()), CameraFromModel>);
+  static_assert(std::is_same_v<decltype(CameraFromTable() * TableFromModel()), CameraFromModel>);
 }
 
 TEST(Frames, PositiveTurntableAngleTurnsCounterClockwiseSeenFromAbove) {

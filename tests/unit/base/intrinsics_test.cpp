@@ -8,8 +8,17 @@ namespace scan {
 namespace {
 
 Intrinsics Lens() {
-  return {.w = 1848, .h = 1224, .fl_x = 5481, .fl_y = 5480, .cx = 925, .cy = 611,
-          .k1 = -0.3, .k2 = 0.8, .p1 = 1e-3, .p2 = -2e-3, .k3 = 0.1};
+  return {.w = 1848,
+          .h = 1224,
+          .fl_x = 5481,
+          .fl_y = 5480,
+          .cx = 925,
+          .cy = 611,
+          .k1 = -0.3,
+          .k2 = 0.8,
+          .p1 = 1e-3,
+          .p2 = -2e-3,
+          .k3 = 0.1};
 }
 
 TEST(Intrinsics, ProjectAndRayAreInverse) {
@@ -31,7 +40,8 @@ TEST(Intrinsics, DistortionJacobianMatchesDifferences) {
   for (int k = 0; k < 2; ++k) {
     Eigen::Vector2d step = Eigen::Vector2d::Zero();
     step[k] = h;
-    const Eigen::Vector2d column = (Distort(Lens(), p + step) - Distort(Lens(), p - step)) / (2 * h);
+    const Eigen::Vector2d column =
+        (Distort(Lens(), p + step) - Distort(Lens(), p - step)) / (2 * h);
     EXPECT_NEAR((column - jacobian.col(k)).norm(), 0, 1e-8);
   }
 }

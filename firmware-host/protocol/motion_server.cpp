@@ -1,0 +1,49 @@
+#include "firmware-host/protocol/motion_server.h"
+
+#include "drivers/base/log.h"
+#include "firmware-host/protocol/motion_messages.h"
+
+namespace scan {
+namespace {
+
+Result<Json> Done(const Status& status) {
+  SCAN_CHECK(status);
+  return Json::object();
+}
+
+}  // namespace
+
+RpcFunctions MotionFunctions(Motion& motion) {
+  RpcFunctions functions;
+  functions["home"] = {[&motion](const Json&, std::stop_token stop) -> Result<Json> {
+                         SCAN_TRY(const HomeReport report, motion.Home(stop));
+                         return ToJson(report);
+                       },
+                       /*immediate=*/false};
+  functions["move_to"] = {[&motion](const Json& params, std::stop_token stop) -> Result<Json> {
+                            SCAN_TRY(const StageTarget target, StageTargetFromJson(params));
+                            SCAN_TRY(const MoveReport report, motion.MoveTo(target, stop));
+                            return ToJson(report);
+                          },
+                          /*immediate=*/false};
+  functions["stop"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Stop()); },
+                       /*immediate=*/true, /*cancels=*/true};
+  functions["abort"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Abort()); },
+                        /*immediate=*/true, /*cancels=*/true};
+  functions["status"] = {[&motion](const Json&, std::stop_token) -> Result<Json> {
+    return ToJson(motion.ReadStatus());
+  }};
+  functions["heartbeat"] = {
+      [](const Json&, std::stop_token) -> Result<Json> { return Json::object(); }};
+  return functions;
+}
+
+void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop) {
+  ServeConnection(channel, MotionFunctions(motion), kHeartbeatLimit, stop);
+  const MotionStatus status = motion.ReadStatus();
+  if (status.turntable == AxisState::moving || status.lift == AxisState::moving)
+    Log(LogLevel::warning, "peer_lost_while_moving", {{"action", "stop"}});
+  (void)motion.Stop();
+}
+
+}  // namespace scan

@@ -1,0 +1,126 @@
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+
+#include "firmware-host/protocol/motion_client.h"
+#include "firmware-host/protocol/motion_messages.h"
+#include "firmware-host/protocol/motion_server.h"
+#include "firmware-host/protocol/socket.h"
+
+namespace scan {
+namespace {
+
+StagePosition SomePosition() {
+  return {.turntable_deg = {30, 29.9, 29.95, 0.1, 0.05}, .lift_mm = {142, 142, 142.01, 0.02, 0.01}};
+}
+
+// Moves never end by themselves: only Stop, Abort or the token end them.
+class EndlessMotion final : public Motion {
+ public:
+  Result<HomeReport> Home(std::stop_token) override { return HomeReport{3, SomePosition()}; }
+  Result<MoveReport> MoveTo(const StageTarget& target, std::stop_token stop) override {
+    if (target.lift_mm < 0) return BadInput("below the lower limit", "lift_mm", "stay above 0");
+    std::unique_lock lock(mutex_);
+    moving_ = true;
+    changed_.notify_all();
+    changed_.wait(lock, stop, [this] { return stops_ > 0; });
+    moving_ = false;
+    return Cancelled("move");
+  }
+  Status Stop() override {
+    const std::lock_guard lock(mutex_);
+    ++stops_;
+    changed_.notify_all();
+    return {};
+  }
+  Status Abort() override { return Stop(); }
+  MotionStatus ReadStatus() override {
+    const std::lock_guard lock(mutex_);
+    MotionStatus status;
+    status.turntable = moving_ ? AxisState::moving : AxisState::idle;
+    status.lift = AxisState::held;
+    status.reference_epoch = 3;
+    status.position = SomePosition();
+    return status;
+  }
+  void WaitUntilMoving() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return moving_; });
+  }
+  int stops() {
+    const std::lock_guard lock(mutex_);
+    return stops_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  bool moving_ = false;
+  int stops_ = 0;
+};
+
+struct Wire {
+  Wire() {
+    auto pair = SocketPair();
+    channel = std::make_unique<Channel>(std::move(pair->first));
+    client = std::make_unique<MotionClient>(std::move(pair->second));
+    server = std::jthread([this](std::stop_token stop) { ServeMotion(*channel, motion, stop); });
+  }
+  EndlessMotion motion;
+  std::unique_ptr<Channel> channel;
+  std::unique_ptr<MotionClient> client;
+  std::jthread server;
+};
+
+TEST(MotionProtocol, ReportsArriveUnchanged) {
+  Wire wire;
+  const auto home = wire.client->Home({});
+  ASSERT_TRUE(home);
+  EXPECT_EQ(home->reference_epoch, 3);
+  EXPECT_EQ(home->position, SomePosition());
+  EXPECT_EQ(wire.client->ReadStatus().lift, AxisState::held);
+}
+
+TEST(MotionProtocol, ErrorsKeepKindWhereAndMend) {
+  Wire wire;
+  const auto refused = wire.client->MoveTo({.turntable_deg = 0, .lift_mm = -1}, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(refused.error().mend, "stay above 0");
+}
+
+TEST(MotionProtocol, AStopTokenReachesAMoveInProgress) {
+  Wire wire;
+  std::stop_source stop;
+  std::jthread stopper([&] {
+    wire.motion.WaitUntilMoving();
+    stop.request_stop();
+  });
+  const auto move = wire.client->MoveTo({.turntable_deg = 10}, stop.get_token());
+  ASSERT_FALSE(move);
+  EXPECT_EQ(move.error().kind, ErrorKind::cancelled);
+  EXPECT_FALSE(wire.client->MoveTo({.turntable_deg = 10}, stop.get_token()))
+      << "a token already requested starts nothing";
+}
+
+TEST(MotionProtocol, APeerThatDiesWhileMovingStopsTheMotion) {
+  Wire wire;
+  std::jthread mover([&] { (void)wire.client->MoveTo({.turntable_deg = 10}, {}); });
+  wire.motion.WaitUntilMoving();
+  wire.channel->Close();
+  mover.join();
+  wire.server.join();
+  EXPECT_GE(wire.motion.stops(), 1);
+  EXPECT_EQ(wire.client->ReadStatus().turntable, AxisState::fault);
+}
+
+TEST(MotionProtocol, MalformedMessagesNameTheField) {
+  EXPECT_EQ(StageTargetFromJson(Json{{"lift_mm", 3}}).error().kind, ErrorKind::bad_input);
+  EXPECT_FALSE(MotionStatusFromJson(Json(3)));
+  Json status = ToJson(MotionStatus{});
+  status["lift"] = "flying";
+  EXPECT_FALSE(MotionStatusFromJson(status));
+}
+
+}  // namespace
+}  // namespace scan
