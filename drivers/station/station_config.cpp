@@ -1,0 +1,196 @@
+#include "drivers/station/station_config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace scan {
+namespace {
+
+bool IsId(std::string_view id) {
+  return !id.empty() && id.size() <= 64 && std::all_of(id.begin(), id.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+  });
+}
+
+Status ValidateAxis(const AxisConfig& axis) {
+  const auto where = [&](const char* key) { return fmt::format("axis.{}.{}", axis.name, key); };
+  if (axis.min && axis.max && !(*axis.min < *axis.max)) {
+    return BadInput("min is not below max", where("min"), "give min < max, or leave both out");
+  }
+  if (axis.self_start > axis.velocity) {
+    return BadInput("self_start is above velocity", where("self_start"), "lower it");
+  }
+  for (const double rate : {axis.velocity, axis.acceleration, axis.self_start}) {
+    if (rate * axis.steps_per_unit < 1 || rate * axis.steps_per_unit > 1e7) {
+      return BadInput("a rate is outside 1 to 10000000 steps/s", where("velocity"),
+                      "check velocity, acceleration, self_start and steps_per_unit");
+    }
+  }
+  const HomingConfig& homing = axis.homing;
+  if (homing.slow > axis.self_start) {
+    return BadInput("the slow approach is above self_start", where("homing.slow"),
+                    "the switch must stop the axis without a ramp: lower it");
+  }
+  if (homing.fast < homing.slow) {
+    return BadInput("fast is below slow", where("homing.fast"), "raise it");
+  }
+  if (homing.back_off <= axis.backlash) {
+    return BadInput("back_off does not leave the backlash", where("homing.back_off"),
+                    "make it larger than backlash");
+  }
+  if (!(homing.max_travel > homing.back_off)) {
+    return BadInput("max_travel is too short", where("homing.max_travel"),
+                    "give the whole travel of the axis and some to spare");
+  }
+  const auto& limit = axis.approach > 0 ? axis.min : axis.max;
+  if (homing.kind == HomingKind::endstop && limit && homing.direction != axis.approach &&
+      (*limit - homing.position) * axis.approach < 2 * axis.backlash) {
+    return BadInput("the limit is too near the endstop", where(axis.approach > 0 ? "min" : "max"),
+                    "keep twice the backlash between them, for the approach from one side");
+  }
+  return {};
+}
+
+template <class Items>
+Status ValidateIds(const Items& items, const char* key) {
+  std::set<std::string> seen;
+  if (items.empty()) {
+    return BadInput(fmt::format("the station has no {}", key), key,
+                    fmt::format("add a [[{}]] table", key));
+  }
+  for (const auto& item : items) {
+    if (!IsId(item.id)) {
+      return BadInput(fmt::format("'{}' is not an id", item.id), fmt::format("{}.id", key),
+                      "use a-z, 0-9 and -");
+    }
+    if (!seen.insert(item.id).second) {
+      return BadInput(fmt::format("id '{}' is there twice", item.id), fmt::format("{}.id", key),
+                      "ids must differ");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+SimErrors DefaultSimErrors(ErrorLevel level) {
+  SimErrors errors;
+  if (level == ErrorLevel::ideal) return errors;
+  errors.focal_rel = 0.0005;
+  errors.principal_point_px = 3;
+  errors.runout_mm = 0.05;
+  errors.axis_tilt_deg = 0.5;
+  errors.backlash_deg = 0.1;
+  errors.backlash_mm = 0.05;
+  errors.lift_scale_rel = 0.001;
+  errors.aim_rotation_deg = 0.2;
+  errors.aim_translation_mm = 0.5;
+  if (level == ErrorLevel::static_errors) return errors;
+  errors.view_sigma_deg = 0.1;
+  errors.view_sigma_mm = 0.1;
+  errors.vibration_deg = 0.3;
+  errors.late_frames = 1;
+  return errors;
+}
+
+Result<ErrorLevel> ParseErrorLevel(std::string_view word) {
+  if (word == "ideal") return ErrorLevel::ideal;
+  if (word == "static") return ErrorLevel::static_errors;
+  if (word == "dynamic") return ErrorLevel::dynamic;
+  return BadInput(fmt::format("'{}' is no error level", word), "sim.errors.level",
+                  "choose ideal, static or dynamic");
+}
+
+StationConfig DefaultSimStation() {
+  StationConfig config;
+  AxisConfig& turntable = config.turntable;
+  turntable.name = "turntable";
+  turntable.unit = "deg";
+  turntable.steps_per_unit = 40;
+  turntable.velocity = 30;
+  turntable.acceleration = 60;
+  turntable.self_start = 5;
+  turntable.backlash = 0.1;
+  turntable.settle_ns = 500'000'000;
+  turntable.homing = {HomingKind::index, 1, 0, 20, 2, 3, 370};
+  turntable.sigma_shared = 0.1;
+  turntable.sigma_view = 0.05;
+  AxisConfig& lift = config.lift;
+  lift.name = "lift";
+  lift.unit = "mm";
+  lift.steps_per_unit = 400;
+  lift.min = 0;
+  lift.max = 200;
+  lift.velocity = 20;
+  lift.acceleration = 80;
+  lift.self_start = 2;
+  lift.backlash = 0.05;
+  lift.settle_ns = 300'000'000;
+  lift.homing = {HomingKind::endstop, -1, -5, 15, 1, 2, 230};
+  lift.sigma_shared = 0.1;
+  lift.sigma_view = 0.05;
+  CameraConfig camera;
+  camera.lens.k1 = -0.06;
+  camera.lens.k2 = 0.08;
+  config.cameras = {camera};
+  config.aims = {{"a0", 15, 20, 35, 550}, {"a1", 45, 160, 35, 550}};
+  config.plan.rings = {{"a0", 12, 0}, {"a1", 12, 15}};
+  config.sim.errors = DefaultSimErrors(ErrorLevel::static_errors);
+  return config;
+}
+
+const CameraConfig* FindCamera(const StationConfig& config, std::string_view id) {
+  for (const CameraConfig& camera : config.cameras) {
+    if (camera.id == id) return &camera;
+  }
+  return nullptr;
+}
+
+const AimConfig* FindAim(const StationConfig& config, std::string_view id) {
+  for (const AimConfig& aim : config.aims) {
+    if (aim.id == id) return &aim;
+  }
+  return nullptr;
+}
+
+Status Validate(const StationConfig& config) {
+  SCAN_CHECK(ValidateAxis(config.turntable));
+  SCAN_CHECK(ValidateAxis(config.lift));
+  SCAN_CHECK(ValidateIds(config.cameras, "camera"));
+  SCAN_CHECK(ValidateIds(config.aims, "aim"));
+  const auto& d = config.lift_geometry.direction_in_station;
+  const double length = std::hypot(d[0], d[1], d[2]);
+  if (!(std::abs(length - 1) < 1e-3)) {
+    return BadInput(fmt::format("direction_in_station has the length {}", length),
+                    "axis.lift.direction_in_station", "give a unit vector, up is [0, 0, 1]");
+  }
+  for (const AimConfig& aim : config.aims) {
+    if ((config.lift.min && aim.lift_mm < *config.lift.min) ||
+        (config.lift.max && aim.lift_mm > *config.lift.max)) {
+      return BadInput(
+          fmt::format("aim '{}' stands at {} mm, outside the lift's limits", aim.id, aim.lift_mm),
+          "aim.lift_mm", "choose a height the lift can reach");
+    }
+  }
+  if (config.plan.rings.empty()) {
+    return BadInput("the plan has no ring", "plan.rings", "add one");
+  }
+  for (const RingConfig& ring : config.plan.rings) {
+    if (!FindAim(config, ring.aim)) {
+      return BadInput(fmt::format("a ring names the aim '{}', which does not exist", ring.aim),
+                      "plan.rings.aim", "add the aim, or name another");
+    }
+  }
+  for (const LostSteps& lost : config.sim.lost_steps) {
+    if (lost.axis != "turntable" && lost.axis != "lift") {
+      return BadInput(fmt::format("'{}' is no axis", lost.axis), "sim.lost_steps.axis",
+                      "choose turntable or lift");
+    }
+  }
+  return {};
+}
+
+}  // namespace scan
