@@ -12,6 +12,7 @@
 #include "drivers/base/frames.h"
 #include "drivers/base/intrinsics.h"
 #include "drivers/base/result.h"
+#include "drivers/motion/on_stop.h"
 
 namespace scan {
 
@@ -34,7 +35,6 @@ struct CtDocument {
   std::string rights;
 };
 
-enum class OnStop { release, hold, brake };
 
 // In the axis' own unit, deg or mm.
 struct AxisDocument {

@@ -5,10 +5,11 @@
 #include <optional>
 #include <string>
 
+#include "drivers/motion/on_stop.h"
+
 namespace scan {
 
 enum class HomingKind { endstop, index };
-enum class OnStop { release, hold, brake };
 
 // Lengths in the axis' own unit (deg or mm), rates in that unit per second.
 struct HomingConfig {

@@ -1,0 +1,8 @@
+// What holds an axis once it has stopped.
+#pragma once
+
+namespace scan {
+
+enum class OnStop { release, hold, brake };
+
+}  // namespace scan
