@@ -18,8 +18,8 @@ class Specimen {
  public:
   virtual ~Specimen() = default;
   virtual std::string_view name() const = 0;
-  // Negative inside, positive outside; a lower bound of the distance, exact near the surface to
-  // first order.
+  // Negative inside, positive outside; its slope is at most 1, so that its size is a lower bound of
+  // the distance to the surface; equal to that near the surface except in fillets.
   virtual double SignedDistance(const Eigen::Vector3d& p) const = 0;
   // Linear-light RGB albedo in [0, 1] of a surface point; varies everywhere.
   virtual Eigen::Vector3d Albedo(const Eigen::Vector3d& p) const = 0;
@@ -34,7 +34,8 @@ std::vector<std::string> SpecimenNames();
 Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name);
 
 // The exact surface as a fine mesh: vertices lie on SignedDistance = 0 to 1e-4 mm, edges about
-// `edge_mm` long, closed and outward.
+// `edge_mm` long, closed, manifold and outward. Same bytes for any number of threads.
+// Precondition: edge_mm > 0.
 TriangleMesh ExactSurface(const Specimen& specimen, double edge_mm);
 
 }  // namespace scan

@@ -9,7 +9,7 @@
 
 #include "drivers/base/units.h"
 
-#include "tests/support/sphere_mesh.h"
+#include "tests/support/meshes.h"
 
 namespace scan {
 namespace {
@@ -44,7 +44,7 @@ void Append(TriangleMesh& mesh, const TriangleMesh& other) {
 }
 
 TEST(ContourGenerators, OfASphereLieOnTheAnalyticCircle) {
-  const TriangleMesh mesh = SphereMesh(kRadius_mm, 5);
+  const TriangleMesh mesh = meshes::Icosphere(kRadius_mm, 5);
   const auto segments = Contours(mesh);
   const double radius_px =
       kFocal_px * kRadius_mm / std::sqrt(kDistance_mm * kDistance_mm - kRadius_mm * kRadius_mm);
@@ -68,7 +68,7 @@ TEST(ContourGenerators, OfASphereLieOnTheAnalyticCircle) {
 
 TEST(ContourGenerators, FormClosedLoopsOnAClosedMesh) {
   std::map<std::uint32_t, int> degree;
-  for (const ContourSegment& s : Contours(SphereMesh(kRadius_mm, 4))) {
+  for (const ContourSegment& s : Contours(meshes::Icosphere(kRadius_mm, 4))) {
     for (std::uint32_t v : s.vertices) ++degree[v];
   }
   ASSERT_GT(degree.size(), 20u);
@@ -76,7 +76,7 @@ TEST(ContourGenerators, FormClosedLoopsOnAClosedMesh) {
 }
 
 TEST(ContourGenerators, DoNotDependOnFaceOrientation) {
-  const TriangleMesh mesh = SphereMesh(kRadius_mm, 4);
+  const TriangleMesh mesh = meshes::Icosphere(kRadius_mm, 4);
   TriangleMesh mixed = mesh;
   for (std::size_t f = 0; f < mixed.faces.size(); f += 3) {
     std::swap(mixed.faces[f][0], mixed.faces[f][1]);
@@ -99,11 +99,11 @@ TEST(ContourGenerators, DoNotDependOnFaceOrientation) {
 
 TEST(ContourGenerators, KnowWhatIsHiddenAndWhatIsInner) {
   // A small sphere before a large one before another small one, all on the optical axis.
-  TriangleMesh mesh = SphereMesh(3, 4, {0, 0, -40});
+  TriangleMesh mesh = meshes::Icosphere(3, 4, {0, 0, -40});
   const auto front_end = static_cast<std::uint32_t>(mesh.vertices.size());
-  Append(mesh, SphereMesh(kRadius_mm, 5));
+  Append(mesh, meshes::Icosphere(kRadius_mm, 5));
   const auto middle_end = static_cast<std::uint32_t>(mesh.vertices.size());
-  Append(mesh, SphereMesh(3, 4, {0, 0, 40}));
+  Append(mesh, meshes::Icosphere(3, 4, {0, 0, 40}));
   int front = 0, middle = 0, back = 0;
   for (const ContourSegment& s : Contours(mesh)) {
     if (s.vertices[0] < front_end) {
@@ -167,7 +167,7 @@ TEST(ContourGenerators, IncludeTheBoundaryOfAnOpenMesh) {
 }
 
 TEST(ContourGenerators, OutsideOfThePictureAreNotVisible) {
-  const TriangleMesh mesh = SphereMesh(kRadius_mm, 4, {200, 0, 0});
+  const TriangleMesh mesh = meshes::Icosphere(kRadius_mm, 4, {200, 0, 0});
   const auto segments = Contours(mesh);
   ASSERT_GT(segments.size(), 20u);
   for (const ContourSegment& s : segments) EXPECT_FALSE(s.visible);

@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "drivers/base/rng.h"
-#include "tests/support/sphere_mesh.h"
+#include "tests/support/meshes.h"
 
 namespace scan {
 namespace {
@@ -110,7 +110,7 @@ TEST(Rasterise, FacesOfAFanNeitherMissNorShareASample) {
 }
 
 TEST(Rasterise, AgreesWithRaysOnAClosedMesh) {
-  const TriangleMesh mesh = SphereMesh(15, 4);
+  const TriangleMesh mesh = meshes::Icosphere(15, 4);
   const Intrinsics in = Camera(400, 300, 3000);
   const CameraFromModel camera_from_model = LookFrom({0.3, -0.8, 0.4}, 200, 0.7);
   const Raster raster = Rasterise(mesh, camera_from_model, in);
@@ -147,7 +147,7 @@ TEST(Rasterise, AgreesWithRaysOnAClosedMesh) {
 }
 
 TEST(Rasterise, NoHolesInsideAClosedMesh) {
-  const TriangleMesh mesh = SphereMesh(15, 5);
+  const TriangleMesh mesh = meshes::Icosphere(15, 5);
   const Intrinsics in = Camera(600, 600, 7000);
   const CameraFromModel camera_from_model = LookFrom({1, 2, 3}, 300, 0);
   const cv::Mat mask = RasteriseMask(mesh, camera_from_model, in);
@@ -296,7 +296,7 @@ TEST(Rasterise, CoverageOfAnUprightEdgeIsFine) {
 }
 
 TEST(Rasterise, SameBytesForAnyNumberOfThreads) {
-  const TriangleMesh mesh = SphereMesh(15, 5);
+  const TriangleMesh mesh = meshes::Icosphere(15, 5);
   Intrinsics in = Camera(500, 400, 5000);
   in.k1 = 0.1;
   const CameraFromModel camera_from_model = LookFrom({-1, 0.4, 0.2}, 250, 1.1);
