@@ -4,12 +4,17 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "drivers/motion/on_stop.h"
 
 namespace scan {
 
 enum class HomingKind { endstop, index };
+
+constexpr std::string_view NameOf(OnStop on_stop) {
+  return on_stop == OnStop::release ? "release" : on_stop == OnStop::hold ? "hold" : "brake";
+}
 
 // Lengths in the axis' own unit (deg or mm), rates in that unit per second.
 struct HomingConfig {
@@ -20,6 +25,7 @@ struct HomingConfig {
   double slow = 1;        // over the edge, always in the sense of `approach`; <= self_start
   double back_off = 2;    // before that; where the switch is left, it goes so deep into it
   double max_travel = 0;  // the switch must come within this
+  friend bool operator==(const HomingConfig&, const HomingConfig&) = default;
 };
 
 struct AxisConfig {
@@ -35,9 +41,11 @@ struct AxisConfig {
   int approach = 1;  // sense of the last approach, to targets and to the home switch
   std::int64_t settle_ns = 0;
   OnStop on_stop = OnStop::hold;
+  bool self_locking = false;  // stays where it is without current
   HomingConfig homing;
   double sigma_shared = 0;  // 1 sigma of the homing, common to a reference epoch
   double sigma_view = 0;    // 1 sigma of a single move
+  friend bool operator==(const AxisConfig&, const AxisConfig&) = default;
 };
 
 }  // namespace scan

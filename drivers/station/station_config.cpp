@@ -159,6 +159,10 @@ const AimConfig* FindAim(const StationConfig& config, std::string_view id) {
 Status Validate(const StationConfig& config) {
   SCAN_CHECK(ValidateAxis(config.turntable));
   SCAN_CHECK(ValidateAxis(config.lift));
+  if (config.lift.on_stop == OnStop::release && !config.lift.self_locking) {
+    return BadInput("the lift would fall when it is released", "axis.lift.on_stop",
+                    "choose hold or brake, or set self_locking = true if its drive locks itself");
+  }
   SCAN_CHECK(ValidateIds(config.cameras, "camera"));
   SCAN_CHECK(ValidateIds(config.aims, "aim"));
   const auto& d = config.lift_geometry.direction_in_station;

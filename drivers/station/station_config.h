@@ -43,11 +43,13 @@ struct CameraConfig {
   double sigma_c_px = 0;            // and of the principal point; 0: 0.3 % of the width
   double sigma_rotation_deg = 0.2;  // of camera_from_lift, each of three components
   double sigma_translation_mm = 0.5;
+  friend bool operator==(const CameraConfig&, const CameraConfig&) = default;
 };
 
 struct LiftGeometry {
   std::string kind = "pitch_axis";  // fixed_pitch manual_aim arc pitch_axis
   std::array<double, 3> direction_in_station{0, 0, 1};
+  friend bool operator==(const LiftGeometry&, const LiftGeometry&) = default;
 };
 
 struct RingConfig {
@@ -59,6 +61,7 @@ struct RingConfig {
 
 struct PlanConfig {
   std::vector<RingConfig> rings;
+  friend bool operator==(const PlanConfig&, const PlanConfig&) = default;
 };
 
 enum class ErrorLevel { ideal, static_errors, dynamic };
@@ -94,6 +97,7 @@ struct LostSteps {
   std::string axis = "turntable";  // turntable lift
   std::int64_t after_steps = 0;
   std::int64_t count = 0;
+  friend bool operator==(const LostSteps&, const LostSteps&) = default;
 };
 
 struct PlacementConfig {
@@ -102,6 +106,7 @@ struct PlacementConfig {
   double tilt_axis_deg = 20;  // of the horizontal axis of the tilt, from table +x
   std::array<double, 3> offset_mm{1.5, -0.8, 20};  // of the pivot; z: the stand's height
   std::array<double, 3> pivot_in_model_mm{0, 0, 0};
+  friend bool operator==(const PlacementConfig&, const PlacementConfig&) = default;
 };
 
 struct SimConfig {
@@ -115,6 +120,7 @@ struct SimConfig {
   int jpeg_quality = 95;
   int settings_delay_frames = 0;  // frames until new settings apply
   double frame_interval_ms = 100;
+  friend bool operator==(const SimConfig&, const SimConfig&) = default;
 };
 
 struct StationConfig {

@@ -1,0 +1,132 @@
+#include "drivers/station/station_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "drivers/base/files.h"
+
+namespace scan {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string DefaultFile() {
+  const auto text = ReadTextFile(SCAN_SOURCE_DIR "/configs/station-sim.toml");
+  EXPECT_TRUE(text);
+  return text.value_or("");
+}
+
+TEST(StationFile, TheDefaultFileSaysWhatTheDefaultsAre) {
+  const auto read = LoadStationConfig(SCAN_SOURCE_DIR "/configs/station-sim.toml");
+  ASSERT_TRUE(read) << ToString(read.error());
+  const StationConfig expected = DefaultSimStation();
+  EXPECT_EQ(read->name, expected.name);
+  EXPECT_EQ(read->turntable, expected.turntable);
+  EXPECT_EQ(read->lift, expected.lift);
+  EXPECT_EQ(read->lift_geometry, expected.lift_geometry);
+  EXPECT_EQ(read->cameras, expected.cameras);
+  EXPECT_EQ(read->aims, expected.aims);
+  EXPECT_EQ(read->plan.rings, expected.plan.rings);
+  EXPECT_EQ(read->sim, expected.sim);
+}
+
+TEST(StationFile, AnEmptyFileIsTheDefaultStation) {
+  const auto read = ParseStationConfig("", "empty.toml");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->sim, DefaultSimStation().sim);
+}
+
+TEST(StationFile, EveryKeyIsReadAndEveryOneIsCommented) {
+  // Another value for each number must reach the structs, or the key is dead.
+  std::istringstream lines(DefaultFile());
+  std::string line, text = DefaultFile();
+  int keys = 0;
+  const std::regex assignment(R"(^([a-z_0-9]+) = .*$)");
+  std::smatch match;
+  while (std::getline(lines, line)) {
+    if (!std::regex_match(line, match, assignment)) continue;
+    ++keys;
+    std::string broken = text;
+    broken.replace(broken.find(line), line.size(), match[1].str() + " = 1979-05-27");
+    const auto read = ParseStationConfig(broken, "broken.toml");
+    ASSERT_FALSE(read) << line;
+    EXPECT_EQ(read.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(read.error().what, HasSubstr(match[1].str())) << line;
+  }
+  EXPECT_GT(keys, 90);
+}
+
+struct BadCase {
+  const char* text;
+  const char* what;
+  const char* where;
+};
+
+class StationFileBad : public ::testing::TestWithParam<BadCase> {};
+
+TEST_P(StationFileBad, IsRefusedWithFileLineAndMend) {
+  const auto read = ParseStationConfig(GetParam().text, "s.toml");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(read.error().what, HasSubstr(GetParam().what));
+  EXPECT_EQ(read.error().where, GetParam().where);
+  EXPECT_FALSE(read.error().mend.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Cases, StationFileBad,
+    ::testing::Values(
+        BadCase{"a = ", "", "s.toml:1"}, BadCase{"\nnme = 'x'", "unknown key nme", "s.toml:2"},
+        BadCase{"[axis.turntable]\nspeed = 3", "unknown key axis.turntable.speed", "s.toml:2"},
+        BadCase{"[axis.rotor]\nvelocity = 3", "unknown key axis.rotor", "s.toml:1"},
+        BadCase{"[axis.lift]\nvelocity = 'fast'", "is not a number", "s.toml:2"},
+        BadCase{"[axis.lift]\nvelocity = nan", "out of range", "s.toml:2"},
+        BadCase{"[axis.lift]\nvelocity = inf", "out of range", "s.toml:2"},
+        BadCase{"[axis.lift]\nvelocity = -1", "out of range", "s.toml:2"},
+        BadCase{"[axis.lift]\n\nmin = 300", "min is not below max", "s.toml:3"},
+        BadCase{"[axis.lift]\non_stop = 'release'", "would fall", "s.toml:2"},
+        BadCase{"[axis.lift]\ndirection_in_station = [0, 0, 0.5]", "length", "s.toml:2"},
+        BadCase{"[axis.lift]\ndirection_in_station = [0, 1]", "three numbers", "s.toml:2"},
+        BadCase{"axis = 3", "is not a table", "s.toml:1"},
+        BadCase{"camera = 3", "list of tables", "s.toml:1"},
+        BadCase{"camera = []", "no camera", "s.toml:1"},
+        BadCase{"[[camera]]\nid = 'C 0'", "is not an id", "s.toml:1"},
+        BadCase{"[[aim]]\nid = 'a'\n[[aim]]\nid = 'a'", "twice", "s.toml:1"},
+        BadCase{"[[aim]]\nid = 'a0'\nlift_mm = 900", "outside the lift's limits", "s.toml:1"},
+        BadCase{"[[plan.rings]]\naim = 'zz'", "does not exist", "s.toml:1"},
+        BadCase{"[[plan.rings]]\naim = 'a0'\ncount = 0", "out of range", "s.toml:3"},
+        BadCase{"[[plan.rings]]\naim = 'a0'\ncount = 2.5", "whole number", "s.toml:3"},
+        BadCase{"[sim]\nformat = 'bmp'", "none of its words", "s.toml:2"},
+        BadCase{"[sim.errors]\nlevel = 'none'", "none of its words", "s.toml:2"},
+        BadCase{"[axis.turntable.homing]\nslow = 9", "above self_start", "s.toml:2"}));
+
+TEST(StationFile, AFileThatIsNotThereIsBadInput) {
+  const auto read = LoadStationConfig("/nonexistent/station.toml");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().kind, ErrorKind::bad_input);
+}
+
+TEST(StationFile, AnyTruncationIsReadOrRefused) {
+  const std::string text = DefaultFile();
+  for (std::size_t length = 0; length < text.size(); length += 37) {
+    const auto read = ParseStationConfig(text.substr(0, length), "cut.toml");
+    if (!read) {
+      EXPECT_EQ(read.error().kind, ErrorKind::bad_input);
+    }
+  }
+}
+
+TEST(StationFile, ALevelIsSetFirstAndThenOverridden) {
+  const auto read = ParseStationConfig("[sim.errors]\nrunout_mm = 0.2\nlevel = 'ideal'", "s.toml");
+  ASSERT_TRUE(read) << ToString(read.error());
+  SimErrors expected = DefaultSimErrors(ErrorLevel::ideal);
+  expected.runout_mm = 0.2;
+  EXPECT_EQ(read->sim.errors, expected);
+}
+
+}  // namespace
+}  // namespace scan
