@@ -4,17 +4,12 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "drivers/motion/on_stop.h"
 
 namespace scan {
 
 enum class HomingKind { endstop, index };
-
-constexpr std::string_view NameOf(OnStop on_stop) {
-  return on_stop == OnStop::release ? "release" : on_stop == OnStop::hold ? "hold" : "brake";
-}
 
 // Lengths in the axis' own unit (deg or mm), rates in that unit per second.
 struct HomingConfig {

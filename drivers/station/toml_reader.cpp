@@ -95,11 +95,10 @@ std::optional<std::size_t> TomlReader::Word(std::string_view key,
   const toml::node* node = Take(key);
   if (!node) return std::nullopt;
   const auto* text = node->as_string();
-  const auto found =
-      text ? std::find(words.begin(), words.end(), text->get()) : words.end();
+  const auto found = text ? std::find(words.begin(), words.end(), text->get()) : words.end();
   if (found == words.end()) {
-    Refuse(*node, key, text ? fmt::format("= \"{}\" is none of its words", text->get())
-                            : "is not a text",
+    Refuse(*node, key,
+           text ? fmt::format("= \"{}\" is none of its words", text->get()) : "is not a text",
            fmt::format("choose one of \"{}\"", fmt::join(words, "\", \"")));
     return std::nullopt;
   }

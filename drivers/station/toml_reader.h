@@ -1,12 +1,12 @@
 // One TOML table, read key by key: wrong types, ranges and unknown keys become errors with a line.
 #pragma once
 
+#include <toml++/toml.h>
 #include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
 #include <vector>
 
 #include "drivers/base/result.h"

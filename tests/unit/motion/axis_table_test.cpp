@@ -7,8 +7,9 @@ namespace {
 
 constexpr AxisState kStates[] = {AxisState::unpowered, AxisState::unreferenced, AxisState::idle,
                                  AxisState::moving,    AxisState::held,         AxisState::fault};
-constexpr AxisCommand kCommands[] = {AxisCommand::home,  AxisCommand::move,    AxisCommand::stop,
-                                     AxisCommand::abort, AxisCommand::release, AxisCommand::acknowledge};
+constexpr AxisCommand kCommands[] = {AxisCommand::home,    AxisCommand::move,
+                                     AxisCommand::stop,    AxisCommand::abort,
+                                     AxisCommand::release, AxisCommand::acknowledge};
 constexpr AxisEvent kEvents[] = {AxisEvent::powered, AxisEvent::released, AxisEvent::motion_started,
                                  AxisEvent::homed,   AxisEvent::arrived,  AxisEvent::stopped,
                                  AxisEvent::aborted, AxisEvent::faulted,  AxisEvent::acknowledged};
