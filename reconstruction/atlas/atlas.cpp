@@ -18,6 +18,8 @@ namespace {
 constexpr std::uint32_t kNone = ~0u;
 constexpr double kStretchQuantile = 0.01;  // the worst percent of a chart's area
 
+constexpr double kMostWasted = 0.02;
+
 using FaceSet = std::vector<std::uint32_t>;
 
 Status CheckRequest(const TriangleMesh& mesh, const AtlasOptions& options) {
@@ -46,6 +48,7 @@ bool UnfoldWell(ChartMesh& chart, const AtlasOptions& options) {
     if (CountFlipped(chart) > 0) return false;
   }
   if (!ScaleToTrueArea(chart) || BorderCrosses(chart)) return false;
+  if (WastedShare(chart, options.max_stretch) > kMostWasted) return false;
   return StretchQuantile(StretchOf(chart), kStretchQuantile) <= options.max_stretch;
 }
 

@@ -132,4 +132,16 @@ double StretchQuantile(std::vector<FaceStretch> stretch, double share) {
   return stretch.empty() ? 0 : stretch.back().largest;
 }
 
+double WastedShare(const ChartMesh& chart, double most) {
+  double total = 0, wasted = 0;
+  for (const Face& f : chart.mesh.faces) {
+    const Eigen::Vector3d& a = chart.mesh.vertices[f[0]];
+    const double area = (chart.mesh.vertices[f[1]] - a).cross(chart.mesh.vertices[f[2]] - a).norm();
+    const double uv_area = DoubleUvArea(chart, f);
+    total += uv_area;
+    wasted += std::max(0.0, uv_area - most * area);
+  }
+  return wasted / total;
+}
+
 }  // namespace scan

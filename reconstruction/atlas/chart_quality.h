@@ -24,4 +24,8 @@ std::vector<FaceStretch> StretchOf(const ChartMesh& chart);
 // Largest singular value that all but `share` of the area stays below.
 double StretchQuantile(std::vector<FaceStretch> stretch, double share);
 
+// Share of the picture's area that faces hold beyond `most` times their area on the surface: spikes
+// that the quantile of the stretch does not see.
+double WastedShare(const ChartMesh& chart, double most);
+
 }  // namespace scan

@@ -1,7 +1,9 @@
 #include "reconstruction/atlas/surface_graph.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace scan {
 namespace {
@@ -34,21 +36,64 @@ std::array<std::uint32_t, 2> EdgeOf(const Face& face, int k) {
   return {face[static_cast<std::size_t>(k)], face[static_cast<std::size_t>((k + 1) % 3)]};
 }
 
+struct Side {
+  std::uint32_t low, high;  // vertices
+  std::uint32_t face;
+  std::int8_t edge;
+  bool forward;
+};
+
+void Link(const Side& a, const Side& b, SurfaceGraph& graph) {
+  graph.links[a.face][static_cast<std::size_t>(a.edge)] = {static_cast<std::int32_t>(b.face),
+                                                           b.edge};
+  graph.links[b.face][static_cast<std::size_t>(b.edge)] = {static_cast<std::int32_t>(a.face),
+                                                           a.edge};
+}
+
+// Three or more faces at an edge: the flattest pairs that run against each other belong together
+// (doubled sheets and shells that touch come apart so); the rest ends here.
+void LinkFlattestPairs(std::vector<Side> sides, SurfaceGraph& graph) {
+  for (;;) {
+    std::size_t best_i = 0, best_j = 0;
+    double flattest = -0.5;
+    for (std::size_t i = 0; i < sides.size(); ++i)
+      for (std::size_t j = i + 1; j < sides.size(); ++j) {
+        if (sides[i].forward == sides[j].forward || sides[i].face == sides[j].face) continue;
+        const double flat = graph.normal[sides[i].face].dot(graph.normal[sides[j].face]);
+        if (flat <= flattest + 1e-9) continue;
+        flattest = flat;
+        best_i = i;
+        best_j = j;
+      }
+    if (best_i == best_j) return;
+    Link(sides[best_i], sides[best_j], graph);
+    sides.erase(sides.begin() + static_cast<std::ptrdiff_t>(best_j));
+    sides.erase(sides.begin() + static_cast<std::ptrdiff_t>(best_i));
+  }
+}
+
 void LinkFaces(const TriangleMesh& mesh, SurfaceGraph& graph) {
   graph.links.resize(mesh.faces.size());
-  const auto neighbours = FaceNeighbours(mesh);
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+  std::vector<Side> sides;
+  for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    if (graph.degenerate[f]) continue;
     for (int k = 0; k < 3; ++k) {
-      const std::int32_t g = neighbours[f][static_cast<std::size_t>(k)];
-      if (g < 0 || graph.degenerate[f] || graph.degenerate[static_cast<std::size_t>(g)]) continue;
-      const auto edge = EdgeOf(mesh.faces[f], k);
-      for (int j = 0; j < 3; ++j) {
-        const auto other = EdgeOf(mesh.faces[static_cast<std::size_t>(g)], j);
-        if ((edge[0] == other[0] && edge[1] == other[1]) ||
-            (edge[0] == other[1] && edge[1] == other[0]))
-          graph.links[f][static_cast<std::size_t>(k)] = {g, static_cast<std::int8_t>(j)};
-      }
+      const auto [from, to] = EdgeOf(mesh.faces[f], k);
+      sides.push_back(
+          {std::min(from, to), std::max(from, to), f, static_cast<std::int8_t>(k), from < to});
     }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.face, a.edge) < std::tie(b.low, b.high, b.face, b.edge);
+  });
+  for (auto first = sides.begin(); first != sides.end();) {
+    const auto last = std::find_if(first, sides.end(), [&](const Side& side) {
+      return side.low != first->low || side.high != first->high;
+    });
+    if (last - first == 2) Link(*first, *(first + 1), graph);
+    // More than a handful of sheets at one edge is no surface, and pairing them grows cubic.
+    if (last - first > 2 && last - first <= 16) LinkFlattestPairs({first, last}, graph);
+    first = last;
   }
 }
 
