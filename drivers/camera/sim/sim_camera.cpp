@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/base/rng.h"
+#include "drivers/camera/sim/encode_picture.h"
 
 namespace scan {
 namespace {
@@ -85,7 +85,11 @@ Result<SimCamera::Exposure> SimCamera::Expose(std::stop_token stop) {
   const std::int64_t slot = (asked_ns - origin_ns_) / interval_ns + 1;
   Exposure exposure;
   exposure.sequence = previous_ ? previous_->sequence + 1 : 0;
-  if (frames_until_applied_ > 0 && --frames_until_applied_ == 0) applied_ = asked_;
+  if (frames_until_applied_ > 0) {
+    --frames_until_applied_;
+  } else {
+    applied_ = asked_;
+  }
   exposure.applied = applied_;
   exposure.bound.not_before_ns = origin_ns_ + slot * interval_ns;
   exposure.bound.not_after_ns = exposure.bound.not_before_ns + exposure_ns();
@@ -143,24 +147,7 @@ Result<Frame> SimCamera::Develop(const Exposure& exposure) {
   }
   AddNoise(picture, options_.noise * *exposure.applied.gain, middle.noise_seed);
 
-  EncodedFile file;
-  file.extension = options_.format;
-  std::vector<int> parameters;
-  if (options_.format == "jpg") {
-    parameters = {cv::IMWRITE_JPEG_QUALITY, options_.jpeg_quality};
-  } else {
-    parameters = {cv::IMWRITE_PNG_COMPRESSION, 1};
-  }
-  try {
-    std::vector<std::uint8_t> encoded;
-    if (!cv::imencode("." + options_.format, picture, encoded, parameters)) {
-      return Failed("picture could not be encoded", options_.info.id, "use jpg or png");
-    }
-    const auto* bytes = reinterpret_cast<const std::byte*>(encoded.data());
-    file.bytes.assign(bytes, bytes + encoded.size());
-  } catch (const cv::Exception& e) {
-    return Failed(e.what(), options_.info.id, "use jpg or png");
-  }
+  SCAN_TRY(EncodedFile file, EncodePicture(picture, options_.format, options_.jpeg_quality));
   if (truth_sink_) {
     truth_sink_({options_.info.id, exposure.sequence, exposure.bound.not_before_ns, middle});
   }
