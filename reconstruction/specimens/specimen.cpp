@@ -7,10 +7,16 @@
 
 namespace scan {
 
-std::vector<std::string> SpecimenNames() { return {"beetle"}; }
+std::vector<std::string> SpecimenNames() {
+  return {"beetle", "orchid", "mushroom", "tomato", "tomato-stalk"};
+}
 
 Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name) {
   if (name == "beetle") return specimens::MakeBeetle();
+  if (name == "orchid") return specimens::MakeOrchid();
+  if (name == "mushroom") return specimens::MakeMushroom();
+  if (name == "tomato") return specimens::MakeTomato(false);
+  if (name == "tomato-stalk") return specimens::MakeTomato(true);
   return BadInput(fmt::format("unknown specimen '{}'", name), "specimen",
                   fmt::format("choose one of {}", fmt::join(SpecimenNames(), ", ")));
 }
