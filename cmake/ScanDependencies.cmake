@@ -14,6 +14,7 @@ find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs)
 
 if(SCAN_RECONSTRUCTION)
   find_package(TBB REQUIRED)
+  pkg_check_modules(MAXFLOW REQUIRED IMPORTED_TARGET maxflow)
   find_package(Ceres REQUIRED)
   set(CGAL_DO_NOT_WARN_ABOUT_CMAKE_BUILD_TYPE TRUE)
   find_package(CGAL REQUIRED)
