@@ -21,6 +21,7 @@ static_assert(std::size(kTypeNames) == std::variant_size_v<LogPayload>);
 constexpr std::string_view kExposureNames[] = {"sensor", "trigger", "hot_shoe", "ptp_bound"};
 constexpr std::string_view kStopNames[] = {"stop", "abort", "emergency_stop"};
 constexpr std::string_view kPlateNames[] = {"background", "flat", "chart"};
+constexpr std::string_view kErrorKindNames[] = {"failed", "bad_input", "cancelled", "device"};
 constexpr std::string_view kEndNames[] = {"complete", "incomplete", "stopped", "failed"};
 constexpr int kMaxInt = std::numeric_limits<int>::max();
 
@@ -78,6 +79,12 @@ Json ToJson(const AppliedSettings& applied) {
   if (applied.exposure_us) json["exposure_us"] = *applied.exposure_us;
   if (applied.gain) json["gain"] = *applied.gain;
   return json;
+}
+
+Json ToJson(const ExposureBound& bound) {
+  return {{"not_before_ns", bound.not_before_ns},
+          {"not_after_ns", bound.not_after_ns},
+          {"source", Name(bound.source, kExposureNames)}};
 }
 
 Json ToJson(const std::vector<FileDocument>& files) {
@@ -171,10 +178,7 @@ struct ToPayloadJson {
     Picture(entry);
     json["files"] = ToJson(entry.files);
     json["sensor_sequence"] = entry.sensor_sequence;
-    if (entry.exposure)
-      json["exposure"] = {{"not_before_ns", entry.exposure->not_before_ns},
-                          {"not_after_ns", entry.exposure->not_after_ns},
-                          {"source", Name(entry.exposure->source, kExposureNames)}};
+    if (entry.exposure) json["exposure"] = ToJson(*entry.exposure);
     json["applied"] = ToJson(entry.applied);
     json["reference_epoch"] = entry.reference_epoch;
     json["axes"] = ToJson(entry.axes);
@@ -184,11 +188,21 @@ struct ToPayloadJson {
       json["prior_sigma_view"] = ToJson(entry.prior_sigma_view);
   }
   void operator()(const RejectEntry& entry) {
-    Picture(entry);
+    if (!entry.view.empty()) json["view"] = entry.view;
+    if (!entry.aim_id.empty()) json["aim_id"] = entry.aim_id;
+    json["camera"] = entry.camera;
+    json["slice"] = entry.slice;
+    json["cause"] = entry.cause;
     json["reason"] = entry.reason;
+    if (!entry.files.empty()) json["files"] = ToJson(entry.files);
+    json["sensor_sequence"] = entry.sensor_sequence;
+    if (entry.exposure) json["exposure"] = ToJson(*entry.exposure);
+    json["applied"] = ToJson(entry.applied);
   }
   void operator()(const RetryEntry& entry) {
-    Picture(entry);
+    if (!entry.view.empty()) json["view"] = entry.view;
+    if (!entry.camera.empty()) json["camera"] = entry.camera;
+    json["slice"] = entry.slice;
     json["attempt"] = entry.attempt;
     json["reason"] = entry.reason;
   }
@@ -220,17 +234,24 @@ struct ToPayloadJson {
     json["reason"] = entry.reason;
   }
   void operator()(const FaultEntry& entry) {
+    if (!entry.view.empty()) json["view"] = entry.view;
     json["device"] = entry.device;
     json["what"] = entry.what;
+    json["where"] = entry.where;
     json["mend"] = entry.mend;
+    json["kind"] = Name(entry.kind, kErrorKindNames);
+    if (!entry.call.empty()) json["call"] = entry.call;
   }
   void operator()(const NoteEntry& entry) {
     json["text"] = entry.text;
+    if (!entry.values.empty()) json["values"] = entry.values;
     if (!entry.plate) return;
     json["plate"] = Name(entry.plate->plate, kPlateNames);
     json["camera"] = entry.plate->camera;
     if (!entry.plate->aim_id.empty()) json["aim_id"] = entry.plate->aim_id;
     json["files"] = ToJson(entry.plate->files);
+    json["sensor_sequence"] = entry.plate->sensor_sequence;
+    if (entry.plate->exposure) json["exposure"] = ToJson(*entry.plate->exposure);
     json["applied"] = ToJson(entry.plate->applied);
   }
   void operator()(const EndEntry& entry) {
@@ -247,6 +268,21 @@ struct ToPayloadJson {
   }
 };
 
+Result<std::optional<ExposureBound>> ExposureFrom(const JsonObject& object) {
+  SCAN_TRY(const auto exposure, object.OptionalObject("exposure"));
+  if (!exposure) return std::nullopt;
+  ExposureBound bound;
+  SCAN_TRY(bound.not_before_ns, exposure->Integer("not_before_ns"));
+  SCAN_TRY(bound.not_after_ns, exposure->Integer("not_after_ns"));
+  SCAN_TRY(bound.source, exposure->Choice<ExposureSource>("source", kExposureNames));
+  return bound;
+}
+
+Result<std::uint64_t> OptionalCountFrom(const JsonObject& object, std::string_view key) {
+  if (!object.Has(key)) return 0;
+  return CountFrom(object, key);
+}
+
 template <class Entry>
 Status ReadPicture(const JsonObject& object, Entry& entry) {
   SCAN_TRY(entry.view, object.Id("view"));
@@ -260,14 +296,7 @@ Result<LogPayload> FrameFrom(const JsonObject& object) {
   SCAN_CHECK(ReadPicture(object, entry));
   SCAN_TRY(entry.files, FilesFrom(object));
   SCAN_TRY(entry.sensor_sequence, CountFrom(object, "sensor_sequence"));
-  SCAN_TRY(const auto exposure, object.OptionalObject("exposure"));
-  if (exposure) {
-    ExposureBound bound;
-    SCAN_TRY(bound.not_before_ns, exposure->Integer("not_before_ns"));
-    SCAN_TRY(bound.not_after_ns, exposure->Integer("not_after_ns"));
-    SCAN_TRY(bound.source, exposure->Choice<ExposureSource>("source", kExposureNames));
-    entry.exposure = bound;
-  }
+  SCAN_TRY(entry.exposure, ExposureFrom(object));
   SCAN_TRY(entry.applied, AppliedFrom(object));
   SCAN_TRY(entry.reference_epoch, object.Int("reference_epoch", 0, kMaxInt));
   SCAN_TRY(const auto axes, object.OptionalObject("axes"));
@@ -309,14 +338,26 @@ Result<LogPayload> SettleFrom(const JsonObject& object) {
 
 Result<LogPayload> RejectFrom(const JsonObject& object) {
   RejectEntry entry;
-  SCAN_CHECK(ReadPicture(object, entry));
+  SCAN_TRY(entry.view, object.Id("view", ""));
+  SCAN_TRY(entry.aim_id, object.Id("aim_id", ""));
+  SCAN_TRY(entry.camera, object.Id("camera"));
+  SCAN_TRY(entry.slice, object.Int("slice", 0, kMaxInt, 0));
+  SCAN_TRY(entry.cause, object.Text("cause", ""));
   SCAN_TRY(entry.reason, object.Text("reason"));
+  if (object.Has("files")) {
+    SCAN_TRY(entry.files, FilesFrom(object));
+  }
+  SCAN_TRY(entry.sensor_sequence, OptionalCountFrom(object, "sensor_sequence"));
+  SCAN_TRY(entry.exposure, ExposureFrom(object));
+  SCAN_TRY(entry.applied, AppliedFrom(object));
   return entry;
 }
 
 Result<LogPayload> RetryFrom(const JsonObject& object) {
   RetryEntry entry;
-  SCAN_CHECK(ReadPicture(object, entry));
+  SCAN_TRY(entry.view, object.Id("view", ""));
+  SCAN_TRY(entry.camera, object.Id("camera", ""));
+  SCAN_TRY(entry.slice, object.Int("slice", 0, kMaxInt, 0));
   SCAN_TRY(entry.attempt, object.Int("attempt", 0, kMaxInt));
   SCAN_TRY(entry.reason, object.Text("reason"));
   return entry;
@@ -356,12 +397,20 @@ Result<LogPayload> AimFrom(const JsonObject& object) {
 Result<LogPayload> NoteFrom(const JsonObject& object) {
   NoteEntry entry;
   SCAN_TRY(entry.text, object.Text("text"));
+  SCAN_TRY(const auto values, object.OptionalObject("values"));
+  if (values) {
+    for (const auto& key : values->Keys()) {
+      SCAN_TRY(entry.values[key], values->Text(key));
+    }
+  }
   if (!object.Has("plate")) return entry;
   PlateDocument plate;
   SCAN_TRY(plate.plate, object.Choice<PlateKind>("plate", kPlateNames));
   SCAN_TRY(plate.camera, object.Id("camera"));
   SCAN_TRY(plate.aim_id, object.Id("aim_id", ""));
   SCAN_TRY(plate.files, FilesFrom(object));
+  SCAN_TRY(plate.sensor_sequence, OptionalCountFrom(object, "sensor_sequence"));
+  SCAN_TRY(plate.exposure, ExposureFrom(object));
   SCAN_TRY(plate.applied, AppliedFrom(object));
   entry.plate = std::move(plate);
   return entry;
@@ -371,7 +420,13 @@ Result<LogPayload> FaultFrom(const JsonObject& object) {
   FaultEntry entry;
   SCAN_TRY(entry.device, object.Text("device"));
   SCAN_TRY(entry.what, object.Text("what"));
+  SCAN_TRY(entry.where, object.Text("where", ""));
   SCAN_TRY(entry.mend, object.Text("mend", ""));
+  SCAN_TRY(entry.view, object.Id("view", ""));
+  SCAN_TRY(entry.call, object.Text("call", ""));
+  if (object.Has("kind")) {
+    SCAN_TRY(entry.kind, object.Choice<ErrorKind>("kind", kErrorKindNames));
+  }
   return entry;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -67,14 +68,21 @@ struct FrameEntry {
   std::optional<CameraFromTable> camera_from_table;  // nominal
   PriorSigma prior_sigma_view;                       // further independent error of this frame
 };
-// A picture that did not count, and why.
+// A picture that did not count, why, and all that its judgement rests on.
 struct RejectEntry {
-  std::string view, camera;
+  std::string view;    // empty: of a plate
+  std::string aim_id;  // of a plate
+  std::string camera;
   int slice = 0;
   std::string reason;
+  std::string cause;                // the reason's kind: before_settled, settings ...
+  std::vector<FileDocument> files;  // kept beside the frames; may be none
+  std::uint64_t sensor_sequence = 0;
+  std::optional<ExposureBound> exposure;
+  AppliedSettings applied;
 };
 struct RetryEntry {
-  std::string view, camera;
+  std::string view, camera;  // empty: of no view (homing, light, a plate)
   int slice = 0;
   int attempt = 0;  // the one that begins, from 2
   std::string reason;
@@ -112,6 +120,10 @@ struct StopEntry {
 };
 struct FaultEntry {
   std::string device, what, mend;
+  std::string where;
+  ErrorKind kind = ErrorKind::device;
+  std::string view;  // during which it happened; empty: none
+  std::string call;  // of the device that failed: home move configure grab set; empty: none
 };
 enum class PlateKind { background, flat, chart };
 struct PlateDocument {
@@ -120,11 +132,14 @@ struct PlateDocument {
   std::string aim_id;  // of a background
   std::vector<FileDocument> files;
   AppliedSettings applied;
+  std::uint64_t sensor_sequence = 0;
+  std::optional<ExposureBound> exposure = {};
 };
 // A plate is logged as a note with its files.
 struct NoteEntry {
   std::string text;
   std::optional<PlateDocument> plate;
+  std::map<std::string, std::string> values = {};  // for programs
 };
 enum class EndResult { complete, incomplete, stopped, failed };
 struct EndEntry {

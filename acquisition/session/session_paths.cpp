@@ -45,6 +45,11 @@ std::string PlatePath(PlateKind kind, const std::string& aim_id, const std::stri
   return "plates/chart_" + end;
 }
 
+std::string RejectPath(const std::string& what, const std::string& camera, int number,
+                       std::string_view extension) {
+  return fmt::format("frames/rejected_{}_{}_{}.{}", what, camera, number, extension);
+}
+
 std::filesystem::path MaskPath(const std::filesystem::path& session, const Photo& photo) {
   return Derived(session, "masks", photo);
 }

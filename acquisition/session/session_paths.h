@@ -22,6 +22,10 @@ std::string FramePath(const PlannedView& view, int slice, int retake, std::strin
 std::string PlatePath(PlateKind kind, const std::string& aim_id, const std::string& camera,
                       int retake, std::string_view extension);
 
+// frames/rejected_WHAT_CAMERA_N.EXT, relative: WHAT is the view, or the aim of a plate.
+std::string RejectPath(const std::string& what, const std::string& camera, int number,
+                       std::string_view extension);
+
 // derived/masks/NAME.png, absolute; NAME is VIEW_CAMERA (with _rN for a retake).
 std::filesystem::path MaskPath(const std::filesystem::path& session, const Photo& photo);
 std::filesystem::path IgnorePath(const std::filesystem::path& session, const Photo& photo);

@@ -98,6 +98,9 @@ Status SessionState::Check(const LogEntry& entry, const std::string& where) cons
                                   retake->replaces_seq, retake->view),
                       where, "name the frame that is replaced");
   }
+  if (const auto* reject = std::get_if<RejectEntry>(&entry.payload);
+      reject && !reject->files.empty())
+    return CheckFiles(reject->files, where);
   if (const auto* aim = std::get_if<AimEntry>(&entry.payload)) {
     if (!IsId(aim->aim_id) || !FindCamera(aim->camera))
       return BadInput("unknown camera '" + aim->camera + "' or no aim id", where,
@@ -141,6 +144,8 @@ Status SessionState::Apply(const LogEntry& entry, const std::string& where) {
   } else if (const auto* note = std::get_if<NoteEntry>(&entry.payload); note && note->plate) {
     plates_.push_back(*note->plate);
     for (const auto& file : note->plate->files) paths_.insert(file.path);
+  } else if (const auto* reject = std::get_if<RejectEntry>(&entry.payload)) {
+    for (const auto& file : reject->files) paths_.insert(file.path);
   }
   return {};
 }

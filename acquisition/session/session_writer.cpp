@@ -129,6 +129,18 @@ Result<std::int64_t> SessionWriter::AppendPlate(PlateDocument plate,
   return Write(NoteEntry{"plate", std::move(plate)}, now);
 }
 
+Result<std::int64_t> SessionWriter::AppendReject(RejectEntry reject,
+                                                 std::span<const EncodedFile> pictures,
+                                                 Timestamp now) {
+  const std::string& what = reject.view.empty() ? reject.aim_id : reject.view;
+  if (CheckPictures(pictures, "rejected picture of '" + what + "'")) {
+    SCAN_TRY(reject.files, WritePictures(pictures, [&](int number, const std::string& extension) {
+               return RejectPath(what, reject.camera, number, extension);
+             }));
+  }
+  return Write(std::move(reject), now);
+}
+
 Result<SessionWriter> CreateSession(const fs::path& folder, const SessionDocument& document,
                                     Timestamp now) {
   return SessionWriter::Create(std::make_unique<FolderSink>(folder), document, now);

@@ -45,6 +45,11 @@ class SessionWriter {
   Result<std::int64_t> AppendPlate(PlateDocument plate, std::span<const EncodedFile> pictures,
                                    Timestamp now);
 
+  // The same for a picture that did not count; `reject.files` is filled in here. A frame without
+  // any whole file is logged without pictures.
+  Result<std::int64_t> AppendReject(RejectEntry reject, std::span<const EncodedFile> pictures,
+                                    Timestamp now);
+
   const SessionState& state() const { return state_; }
 
  private:
