@@ -23,6 +23,8 @@ Status CheckRing(const Ring& ring, const std::string& where) {
   if (ring.count < 1 || ring.count > kMaxRingViews)
     return BadInput(fmt::format("count {} is out of range", ring.count), where,
                     fmt::format("give 1 to {} views a ring", kMaxRingViews));
+  if (ring.cameras.empty() || ring.cameras.size() > 100)
+    return BadInput(fmt::format("{} cameras", ring.cameras.size()), where, "name 1 to 100");
   if (!std::isfinite(ring.lift_mm) || !std::isfinite(ring.start_deg))
     return BadInput("lift or start angle is not a number", where, "give finite mm and degrees");
   return {};
@@ -35,19 +37,21 @@ Result<std::vector<PlannedView>> PlanRings(const std::vector<Ring>& rings) {
   for (std::size_t r = 0; r < rings.size(); ++r) {
     const Ring& ring = rings[r];
     SCAN_CHECK(CheckRing(ring, fmt::format("ring {} of the plan", r)));
-    if (views.size() + static_cast<std::size_t>(ring.count) > kMaxViews)
+    if (views.size() + static_cast<std::size_t>(ring.count) * ring.cameras.size() > kMaxViews)
       return BadInput(fmt::format("more than {} views", kMaxViews),
                       fmt::format("ring {} of the plan", r), "split it into several sessions");
     for (int i = 0; i < ring.count; ++i) {
-      PlannedView view;
-      view.id = fmt::format("v{:03}", views.size());
-      view.camera = ring.camera;
-      view.turntable_deg = ring.start_deg + 360.0 * i / ring.count;
-      view.lift_mm = ring.lift_mm;
-      view.exposure_us = ring.exposure_us;
-      view.mounting_id = ring.mounting_id;
-      view.aim_id = ring.aim_id;
-      views.push_back(std::move(view));
+      for (const std::string& camera : ring.cameras) {
+        PlannedView view;
+        view.id = fmt::format("v{:03}", views.size());
+        view.camera = camera;
+        view.turntable_deg = ring.start_deg + 360.0 * i / ring.count;
+        view.lift_mm = ring.lift_mm;
+        view.exposure_us = ring.exposure_us;
+        view.mounting_id = ring.mounting_id;
+        view.aim_id = ring.aim_id;
+        views.push_back(std::move(view));
+      }
     }
   }
   SCAN_CHECK(CheckViews(views));

@@ -13,10 +13,10 @@ namespace scan {
 struct Ring {
   std::string aim_id = "a0";
   double lift_mm = 0;
-  int count = 12;          // views, 1 to 3600
-  double start_deg = 0;    // turntable angle of the first view
-  double exposure_us = 0;  // 0: as the camera stands
-  std::string camera = "c0";
+  int count = 12;                             // positions, 1 to 3600
+  double start_deg = 0;                       // turntable angle of the first view
+  double exposure_us = 0;                     // 0: as the camera stands
+  std::vector<std::string> cameras = {"c0"};  // each takes a view at every position
   std::string mounting_id = "m0";
 };
 
