@@ -107,22 +107,20 @@ Result<CaptureRun::Step> CaptureRun::TakePlates() {
     SCAN_CHECK(journal_.Append(std::move(note)));
   }
   PromptAnswer answer;
-  if (!missing.empty() && prompt_ && !history_.specimen_removed) {
+  if (!missing.empty() && prompt_) {  // also where the log says that it is off: it may be back
     SCAN_TRY(const Step step, Prompt(SpecimenAction::remove, answer));
     if (step != Step::done) return step;
     history_.specimen_removed = answer.confirmed;
   }
   if (!history_.specimen_removed) return Step::done;
-  if (prompt_) {
-    for (const PlannedView* view : missing) {
-      SCAN_TRY(const Step step, TakePlate(*view));
-      if (step == Step::view_failed && options_.on_failed_view == OnFailedView::go_on) continue;
-      if (step != Step::done) return step == Step::view_failed ? Step::faulted : step;
-    }
-  }
   if (!prompt_)
     return End(Error{ErrorKind::failed, "the specimen is still off the platter", "resume",
                      "resume with somebody to put it back (a specimen prompt)"});
+  for (const PlannedView* view : missing) {
+    SCAN_TRY(const Step step, TakePlate(*view));
+    if (step == Step::view_failed && options_.on_failed_view == OnFailedView::go_on) continue;
+    if (step != Step::done) return step == Step::view_failed ? Step::faulted : step;
+  }
   SCAN_TRY(const Step step, Prompt(SpecimenAction::place, answer));
   if (step != Step::done) return step;
   if (!answer.confirmed)
