@@ -24,9 +24,9 @@ struct FreeDirection {
   enum class Scope { mounting, view, shared };
   Kind kind = Kind::rotation;
   Scope scope = Scope::mounting;
-  std::string of;                                     // mounting id or view name; empty if shared
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();    // model frame, unit length
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();    // model frame, mm, on the axis
+  std::string of;                                   // mounting id or view name; empty if shared
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  // model frame, unit length
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // model frame, mm, on the axis
   double data_sigma = 0;  // what the data alone say: rad, mm or relative; infinite is written null
   std::string held_by;    // "turntable log", "prior", "gauge"
 };
@@ -46,13 +46,13 @@ struct ViewPose {
   std::string mounting;
   std::string aim;
   ViewStatus status = ViewStatus::rejected;
-  std::string reason;  // of the rejection; empty when accepted
+  std::string reason;                 // of the rejection; empty when accepted
   CameraFromModel camera_from_model;  // rigid, mm of the mesh
   double cost_px = 0;                 // Eq 3, Euclidean, picture reduced to a longest side of 462
   double cost_l1_px = 0;              // Eq 3 with the authors' city-block transform, same picture
   double contour_rms_px = 0;          // full size
-  // Marginal posterior of (w rad, rho mm), x_true = Exp(w) x_est + rho, x_est = camera_from_model x,
-  // pivot the camera centre. Always finite.
+  // Marginal posterior of (w rad, rho mm), x_true = Exp(w) x_est + rho, x_est = camera_from_model
+  // x, pivot the camera centre. Always finite.
   Matrix6d covariance = Matrix6d::Zero();
   SurfaceSigma surface_sigma_px;
   std::vector<AlternativePose> alternatives;

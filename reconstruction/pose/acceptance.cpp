@@ -1,0 +1,67 @@
+#include "reconstruction/pose/acceptance.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace scan {
+
+Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
+                          const ViewState& state, double tolerance_px, double spacing_px) {
+  Explained explained;
+  const auto samples =
+      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, spacing_px);
+  explained.sees_anything = !samples.empty();
+  if (samples.empty() || photo.empty()) return explained;
+
+  const MatchResult match = MatchContour(samples, photo, state.mask_bias_px, 3 * tolerance_px);
+  double near_px = 0, squares = 0;
+  for (const ContourMatch& m : match.matches) {
+    if (std::abs(m.residual_px) > tolerance_px) continue;
+    near_px += m.length_px;
+    squares += m.length_px * m.residual_px * m.residual_px;
+  }
+  const double model_px = match.MatchedLength() + match.unmatched_px;
+  explained.model_share = model_px > 0 ? near_px / model_px : 0;
+  explained.rms_px = near_px > 0 ? std::sqrt(squares / near_px) : 0;
+
+  // The other way: pieces of the model's contour, each a little longer than it is so that
+  // neighbours overlap, and every one of them.
+  std::vector<GridSegment> pieces;
+  for (const ContourSample& s :
+       FindContourSamples(mesh, state.camera_from_model, state.intrinsics, 1.0)) {
+    const Eigen::Vector2d middle = s.pixel + state.mask_bias_px * s.normal;
+    const Eigen::Vector2d half = s.half + 1.0 * s.half.normalized();
+    pieces.push_back({middle - half, middle + half, s.normal, 0});
+  }
+  const ContourGrid grid(std::move(pieces), state.intrinsics.w, state.intrinsics.h);
+  std::size_t found = 0;
+  for (const ContourPoint& p : photo.points)
+    found += grid.Nearest(p.position, p.normal, tolerance_px, 0.5).has_value();
+  explained.photo_share = static_cast<double>(found) / static_cast<double>(photo.points.size());
+  return explained;
+}
+
+std::string RejectionReason(const Explained& explained, double view_prior_chi2,
+                            const AcceptanceOptions& options) {
+  if (!explained.sees_anything)
+    return "the specimen's surface falls outside of the picture: wrong pose or wrong photograph";
+  if (explained.photo_share < options.explained)
+    return fmt::format(
+        "only {:.0f} % of the photograph's outline lies on the model's: the mask shows something "
+        "else, or the specimen moved or changed",
+        100 * explained.photo_share);
+  if (explained.model_share < options.explained)
+    return fmt::format(
+        "only {:.0f} % of the model's outline is seen in the photograph: a part is missing in the "
+        "mask, hidden, or moved",
+        100 * explained.model_share);
+  if (view_prior_chi2 > options.prior_chi2)
+    return fmt::format(
+        "the outline fits only at a pose that the log makes improbable (chi-square {:.0f} of 8): "
+        "lost steps, or the specimen moved",
+        view_prior_chi2);
+  return {};
+}
+
+}  // namespace scan

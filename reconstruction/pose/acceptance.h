@@ -1,0 +1,31 @@
+// Whether a view's silhouette is explained by its pose, both ways.
+#pragma once
+
+#include <string>
+
+#include "reconstruction/pose/joint_refine.h"
+
+namespace scan {
+
+struct AcceptanceOptions {
+  double explained = 0.8;       // least share of either contour
+  double sigmas = 3;            // what counts as explained
+  double sigma_floor_px = 0.5;  // at 1848 px; never finer than this
+  double prior_chi2 = 26.12;    // 99.9 % for the 8 deviations of a view
+};
+
+struct Explained {
+  double photo_share = 0;      // of the photo's contour, flagged pieces left out
+  double model_share = 0;      // of the model's visible contour
+  double rms_px = 0;           // of the residuals that count as explained
+  bool sees_anything = false;  // a part of the model's contour is in the picture
+};
+// `tolerance_px`: distance that still counts.
+Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
+                          const ViewState& state, double tolerance_px, double spacing_px);
+
+// Empty when accepted, else the reason in one sentence.
+std::string RejectionReason(const Explained& explained, double view_prior_chi2,
+                            const AcceptanceOptions& options);
+
+}  // namespace scan

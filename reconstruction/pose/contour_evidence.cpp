@@ -1,0 +1,133 @@
+#include "reconstruction/pose/contour_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruction/pose/rigid_motion.h"
+
+namespace scan {
+namespace {
+
+constexpr double kMinCosine = 0.5;  // normals within 60 degrees
+
+double TukeyWeight(double r, double limit) {
+  const double u = r / limit;
+  if (std::abs(u) >= 1) return 0;
+  return (1 - u * u) * (1 - u * u);
+}
+
+}  // namespace
+
+PhotoContour MakePhotoContour(const Mask& mask) {
+  PhotoContour photo;
+  photo.binary = mask.binary;
+  std::vector<GridSegment> segments;
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  Eigen::AlignedBox2d box;
+  for (const Contour& contour : ExtractContours(mask)) {
+    const std::size_t n = contour.points.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      const ContourPoint& p = contour.points[i];
+      const ContourPoint& q = contour.points[(i + 1) % n];
+      const double twice = p.position.x() * q.position.y() - q.position.x() * p.position.y();
+      photo.area_px += 0.5 * twice;
+      moment += twice / 6.0 * (p.position + q.position);
+      box.extend(p.position);
+      photo.touches_border |= (p.flags & kContourCut) != 0;
+      const Eigen::Vector2d normal = p.normal + q.normal;
+      const double norm = normal.norm();
+      if (norm < 1e-6) continue;
+      segments.push_back(
+          {p.position, q.position, normal / norm, static_cast<std::uint8_t>(p.flags | q.flags)});
+    }
+    for (const ContourPoint& p : Resampled(contour, 2.0).points) {
+      if (p.flags == 0) photo.points.push_back(p);
+    }
+  }
+  photo.length_px = 2.0 * static_cast<double>(photo.points.size());
+  if (photo.area_px > 0) photo.centroid = moment / photo.area_px;
+  if (!box.isEmpty()) photo.diameter_px = box.diagonal().norm();
+  photo.grid = ContourGrid(std::move(segments), mask.coverage.cols, mask.coverage.rows);
+  return photo;
+}
+
+double ContourResidual(const ViewState& state, const Eigen::Vector3d& point,
+                       const Eigen::Vector2d& target, const Eigen::Vector2d& normal,
+                       const Eigen::Vector3d& pivot, EvidenceVector* dr) {
+  const Intrinsics& in = state.intrinsics;
+  const Eigen::Vector3d x = state.camera_from_model * point;
+  const double inverse_z = 1.0 / x.z();
+  Eigen::Matrix2d ddistorted_dnormalised;
+  const Eigen::Vector2d distorted = Distort(in, x.head<2>() * inverse_z, &ddistorted_dnormalised);
+  const Eigen::Vector2d focal(in.fl_x, in.fl_y), centre(in.cx, in.cy);
+  const Eigen::Vector2d pixel = focal.cwiseProduct(distorted) + centre;
+  if (dr) {
+    Eigen::Matrix<double, 2, 3> dnormalised_dx;
+    dnormalised_dx << inverse_z, 0, -x.x() * inverse_z * inverse_z,  //
+        0, inverse_z, -x.y() * inverse_z * inverse_z;
+    const Eigen::RowVector3d dr_dx =
+        -normal.transpose() * focal.asDiagonal() * ddistorted_dnormalised * dnormalised_dx;
+    dr->head<3>() = -(dr_dx * Skew(x - pivot)).transpose();  // dx/dw = -[x - pivot]
+    dr->segment<3>(3) = dr_dx.transpose();
+    (*dr)[6] = -normal.dot(pixel - centre);
+    dr->segment<2>(7) = -normal;
+    (*dr)[9] = -1;
+  }
+  return normal.dot(target - pixel) - state.mask_bias_px;
+}
+
+double MatchResult::MatchedLength() const {
+  double length = 0;
+  for (const ContourMatch& match : matches) length += match.length_px;
+  return length;
+}
+
+MatchResult MatchContour(std::span<const ContourSample> samples, const PhotoContour& photo,
+                         double mask_bias_px, double window_px) {
+  MatchResult result;
+  result.matches.reserve(samples.size());
+  for (const ContourSample& sample : samples) {
+    const Eigen::Vector2d from = sample.pixel + mask_bias_px * sample.normal;
+    const auto crossing = photo.grid.Nearest(from, sample.normal, window_px, kMinCosine);
+    if (!crossing) {
+      result.unmatched_px += sample.length_px;
+      continue;
+    }
+    if (photo.grid.segments()[crossing->segment].flags != 0) continue;
+    result.matches.push_back({sample.point, from + crossing->distance_px * sample.normal,
+                              sample.normal, crossing->distance_px, sample.length_px});
+  }
+  return result;
+}
+
+double RobustSigma(std::span<const ContourMatch> matches) {
+  if (matches.empty()) return 0;
+  std::vector<double> magnitude;
+  magnitude.reserve(matches.size());
+  for (const ContourMatch& match : matches) magnitude.push_back(std::abs(match.residual_px));
+  const auto middle = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2);
+  std::nth_element(magnitude.begin(), middle, magnitude.end());
+  return 1.4826 * *middle;
+}
+
+CondensedEvidence Condense(const ViewState& state, std::span<const ContourMatch> matches,
+                           const Eigen::Vector3d& pivot, const EvidenceWeights& weights) {
+  CondensedEvidence evidence;
+  evidence.state = state;
+  evidence.pivot = pivot;
+  const double information = 1.0 / (weights.sigma_px * weights.sigma_px);
+  for (const ContourMatch& match : matches) {
+    EvidenceVector dr;
+    const double r = ContourResidual(state, match.point, match.target, match.normal, pivot, &dr);
+    const double count = std::min(1.0, match.length_px / weights.correlation_px) *
+                         TukeyWeight(r, weights.tukey_sigmas * weights.sigma_px);
+    if (count <= 0) continue;
+    evidence.H.selfadjointView<Eigen::Lower>().rankUpdate(dr, count * information);
+    evidence.g += (count * information * r) * dr;
+    evidence.weight += count;
+  }
+  evidence.H.triangularView<Eigen::StrictlyUpper>() = evidence.H.transpose();
+  return evidence;
+}
+
+}  // namespace scan

@@ -1,0 +1,95 @@
+#include "reconstruction/pose/joint_refine.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace scan {
+namespace {
+
+constexpr double kBinaryVariance = 1.0 / 12.0;  // px^2, quantisation of a binary mask
+
+ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+                double window_px, const RefineOptions& options) {
+  ViewFit fit;
+  const auto samples =
+      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, options.spacing_px);
+  fit.match = MatchContour(samples, photo, state.mask_bias_px, window_px);
+  const double floor = std::sqrt(options.sigma_floor_px * options.sigma_floor_px +
+                                 (photo.binary ? kBinaryVariance : 0.0));
+  fit.sigma_px = std::max(RobustSigma(fit.match.matches), floor);
+  EvidenceWeights weights;
+  weights.sigma_px = fit.sigma_px;
+  weights.correlation_px = options.correlation_px;
+  fit.evidence = Condense(state, fit.match.matches, state.camera_from_model * mesh.centre, weights);
+  return fit;
+}
+
+// Pixels that a view's surface moves at most, about, between two poses.
+double MotionPx(const ContourMesh& mesh, const CameraFromModel& a, const CameraFromModel& b,
+                const Intrinsics& intrinsics) {
+  const Eigen::Vector3d pivot = a * mesh.centre;
+  const Vector6d motion = MotionBetween(a, b, pivot);
+  const double px_per_mm = intrinsics.fl_x / std::max(pivot.z(), 1.0);
+  return px_per_mm * (motion.head<3>().norm() * mesh.radius_mm + motion.segment<2>(3).norm() +
+                      std::abs(motion[5]) * mesh.radius_mm / std::max(pivot.z(), 1.0));
+}
+
+}  // namespace
+
+std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
+                              std::span<const PhotoContour> photos, const std::vector<bool>& use,
+                              const RigParameters& parameters, double window_px,
+                              const RefineOptions& options) {
+  std::vector<ViewFit> fits(photos.size());
+  tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
+    if (!use[i]) return;
+    const int view = static_cast<int>(i);
+    const ViewState state{rig.CameraFromModelOf(parameters, view),
+                          rig.IntrinsicsOf(parameters, rig.views()[i].lens),
+                          parameters.mask_bias_px};
+    fits[i] = FitView(mesh, photos[i], state, window_px, options);
+  });
+  return fits;
+}
+
+RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
+                         std::span<const PhotoContour> photos, const std::vector<bool>& use,
+                         const RigParameters& start, const RefineOptions& options,
+                         std::stop_token stop) {
+  RefineResult result;
+  result.parameters = start;
+  double window_px = options.first_window_px;
+  std::vector<std::optional<CondensedEvidence>> evidence(photos.size());
+  for (; result.iterations < options.max_iterations && !stop.stop_requested();
+       ++result.iterations) {
+    result.fits = FitViews(mesh, rig, photos, use, result.parameters, window_px, options);
+    for (std::size_t i = 0; i < photos.size(); ++i) evidence[i] = result.fits[i].evidence;
+    const RigParameters before = result.parameters;
+    result.cost = SolveRig(rig, evidence, result.parameters);
+    double moved_px = 0;
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+      if (!use[i]) continue;
+      const int view = static_cast<int>(i);
+      moved_px = std::max(moved_px, MotionPx(mesh, rig.CameraFromModelOf(before, view),
+                                             rig.CameraFromModelOf(result.parameters, view),
+                                             rig.nominal_intrinsics(rig.views()[i].lens)));
+    }
+    const bool at_last_window = window_px <= options.last_window_px;
+    if (at_last_window && moved_px < options.converged_px) {
+      result.converged = true;
+      break;
+    }
+    // Half of the way each time, or with the residuals when these fall faster.
+    double largest_sigma = 0;
+    for (const ViewFit& fit : result.fits) largest_sigma = std::max(largest_sigma, fit.sigma_px);
+    window_px = std::max(options.last_window_px,
+                         std::min(0.7 * window_px, std::max(6 * largest_sigma, moved_px)));
+  }
+  result.fits =
+      FitViews(mesh, rig, photos, use, result.parameters, options.last_window_px, options);
+  return result;
+}
+
+}  // namespace scan

@@ -1,0 +1,56 @@
+// Outer loop of the joint solve: find the contour generators, match them to the photographs,
+// condense, solve the rig; again until nothing moves.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "drivers/base/progress.h"
+#include "reconstruction/mesh/mesh.h"
+#include "reconstruction/pose/contour_evidence.h"
+#include "reconstruction/pose/contour_sample.h"
+#include "reconstruction/pose/rig_solve.h"
+
+namespace scan {
+
+struct RefineOptions {
+  double first_window_px = 64;  // search along the normal; shrinks with the residuals
+  double last_window_px = 8;
+  double spacing_px = 4;         // of contour samples
+  double correlation_px = 30;    // of model discrepancy along the contour, see EvidenceWeights
+  double sigma_floor_px = 0.15;  // sub-pixel contours; binary masks add a pixel's quantisation
+  int max_iterations = 40;
+  double converged_px = 0.01;  // largest motion of any view's surface in the last step
+};
+
+struct ViewFit {
+  MatchResult match;
+  double sigma_px = 0;  // robust scale of the residuals, floored
+  std::optional<CondensedEvidence> evidence;
+};
+
+struct RefineResult {
+  RigParameters parameters;
+  std::vector<ViewFit> fits;  // at `parameters`
+  double cost = 0;            // of the last rig solve
+  int iterations = 0;
+  bool converged = false;
+};
+
+// `use[i]` is false for views that take no part; photos[i] may then be empty.
+// Parallel over the views inside; the same bytes for any number of threads. Stops early, not
+// converged, when asked to.
+RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
+                         std::span<const PhotoContour> photos, const std::vector<bool>& use,
+                         const RigParameters& start, const RefineOptions& options,
+                         std::stop_token stop);
+
+// Matches and condenses every view in use at given parameters, without solving.
+std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
+                              std::span<const PhotoContour> photos, const std::vector<bool>& use,
+                              const RigParameters& parameters, double window_px,
+                              const RefineOptions& options);
+
+}  // namespace scan

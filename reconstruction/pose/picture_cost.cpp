@@ -1,0 +1,76 @@
+#include "reconstruction/pose/picture_cost.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "reconstruction/pose/silhouette_raster.h"
+
+namespace scan {
+
+std::vector<cv::Point> BoundaryPixels(const cv::Mat& mask) {
+  std::vector<cv::Point> boundary;
+  for (int y = 0; y < mask.rows; ++y) {
+    const uchar* row = mask.ptr<uchar>(y);
+    const uchar* above = y > 0 ? mask.ptr<uchar>(y - 1) : nullptr;
+    const uchar* below = y + 1 < mask.rows ? mask.ptr<uchar>(y + 1) : nullptr;
+    for (int x = 0; x < mask.cols; ++x) {
+      if (!row[x]) continue;
+      const bool at_edge = (x > 0 && !row[x - 1]) || (x + 1 < mask.cols && !row[x + 1]) ||
+                           (above && !above[x]) || (below && !below[x]);
+      if (at_edge) boundary.emplace_back(x, y);
+    }
+  }
+  return boundary;
+}
+
+ReducedPicture ReducePicture(const Mask& mask, const Intrinsics& intrinsics, int longest_side) {
+  ReducedPicture picture;
+  if (mask.coverage.empty()) return picture;
+  const double scale =
+      std::min(1.0, static_cast<double>(longest_side) / std::max(intrinsics.w, intrinsics.h));
+  const int w = std::max(1, static_cast<int>(std::lround(scale * intrinsics.w)));
+  const int h = std::max(1, static_cast<int>(std::lround(scale * intrinsics.h)));
+  picture.intrinsics = Scaled(intrinsics, w, h);
+  cv::Mat reduced;
+  cv::resize(mask.coverage, reduced, cv::Size(w, h), 0, 0, cv::INTER_AREA);
+  cv::Mat binary = reduced > 127;
+  const std::vector<cv::Point> boundary = BoundaryPixels(binary);
+  if (boundary.empty()) return picture;
+  picture.mask = binary;
+  cv::Mat seeds(binary.size(), CV_8U, cv::Scalar(255));
+  for (const cv::Point& p : boundary) seeds.at<uchar>(p) = 0;
+  cv::distanceTransform(seeds, picture.distance_l1, cv::DIST_L1, 3, CV_32F);
+  cv::distanceTransform(seeds, picture.distance_l2, cv::DIST_L2, cv::DIST_MASK_PRECISE, CV_32F);
+  return picture;
+}
+
+PictureCost CostOfPose(const ReducedPicture& picture, const TriangleMesh& mesh,
+                       const CameraFromModel& camera_from_model) {
+  const float nowhere = std::numeric_limits<float>::quiet_NaN();
+  std::vector<Eigen::Vector2f> pixels;
+  pixels.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3d& v : mesh.vertices) {
+    const auto pixel = Project(picture.intrinsics, camera_from_model * v);
+    pixels.push_back(pixel ? Eigen::Vector2f(pixel->cast<float>())
+                           : Eigen::Vector2f(nowhere, nowhere));
+  }
+  cv::Mat rendered(picture.mask.size(), CV_8U, cv::Scalar(0));
+  FillTriangles(pixels, mesh.faces, rendered);
+  PictureCost cost;
+  const std::vector<cv::Point> boundary = BoundaryPixels(rendered);
+  if (boundary.empty()) {
+    cost.l1_px = cost.l2_px = std::max(rendered.cols, rendered.rows);
+    return cost;
+  }
+  for (const cv::Point& p : boundary) {
+    cost.l1_px += picture.distance_l1.at<float>(p);
+    cost.l2_px += picture.distance_l2.at<float>(p);
+  }
+  cost.l1_px /= static_cast<double>(boundary.size());
+  cost.l2_px /= static_cast<double>(boundary.size());
+  return cost;
+}
+
+}  // namespace scan

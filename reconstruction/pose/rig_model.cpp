@@ -1,0 +1,114 @@
+#include "reconstruction/pose/rig_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruction/pose/rig_chain.h"
+
+namespace scan {
+namespace {
+
+template <class T>
+int IndexOf(std::vector<T>& known, const T& id) {
+  const auto found = std::find(known.begin(), known.end(), id);
+  if (found != known.end()) return static_cast<int>(found - known.begin());
+  known.push_back(id);
+  return static_cast<int>(known.size()) - 1;
+}
+
+std::optional<CameraFromTable> NominalPose(const PhotoSet& photos, const Photo& photo) {
+  if (photo.camera_from_table) return photo.camera_from_table;
+  const Aim& aim = photos.aims[photo.aim];
+  if (!aim.camera_from_lift || !photo.turntable_rad) return std::nullopt;
+  const double lift_mm = photo.lift_mm ? photo.lift_mm->nominal : 0.0;
+  return *aim.camera_from_lift * MakeLiftFromStation(lift_mm, photos.lift_direction_in_station) *
+         MakeStationFromTable(photo.turntable_rad->nominal);
+}
+
+// The axis's own error, no less than the floor.
+double AtLeast(double sigma, double floor) { return std::hypot(sigma, floor); }
+
+}  // namespace
+
+RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(priors) {
+  for (const LensState& lens : photos.lens_states) {
+    intrinsics_.push_back(lens.intrinsics);
+    lens_sigma_.push_back(lens.sigma);
+    if (lens_sigma_.back().c_px <= 0) lens_sigma_.back().c_px = 0.003 * lens.intrinsics.w;
+  }
+  for (const Aim& aim : photos.aims) aim_sigma_.push_back(aim.sigma);
+  for (const Photo& photo : photos.photos) {
+    RigView view;
+    view.mounting = IndexOf(mounting_ids_, photo.mounting_id);
+    view.epoch = IndexOf(epoch_ids_, photo.reference_epoch);
+    view.aim = photo.aim;
+    view.lens = photos.aims[photo.aim].lens_state;
+    view.lift_direction = photos.lift_direction_in_station.normalized();
+    epoch_sigma_rad_.resize(epoch_ids_.size(), 0);
+    if (const auto nominal = NominalPose(photos, photo)) {
+      view.logged = true;
+      view.turns = photo.turntable_rad.has_value();
+      if (view.turns) {
+        view.turntable_rad = photo.turntable_rad->nominal;
+        view.sigma_turntable_rad = photo.turntable_rad->sigma_view;
+        epoch_sigma_rad_[view.epoch] =
+            std::max(epoch_sigma_rad_[view.epoch], photo.turntable_rad->sigma_shared);
+      }
+      if (photo.lift_mm) view.sigma_lift_mm = photo.lift_mm->sigma_view;
+      view.camera_from_station = *nominal * MakeStationFromTable(view.turntable_rad).inverse();
+      view.sigma_camera = {
+          AtLeast(photo.sigma_view.rotation_rad, priors.view_floor.rotation_rad),
+          AtLeast(photo.sigma_view.translation_mm, priors.view_floor.translation_mm)};
+    }
+    views_.push_back(view);
+  }
+  start_.resize(mounting_ids_.size());
+}
+
+RigParameters RigModel::Nominal() const {
+  RigParameters p;
+  p.mountings.resize(mounting_ids_.size(), {});
+  p.epochs.resize(epoch_ids_.size(), 0);
+  p.aims.resize(aim_sigma_.size(), {});
+  p.lenses.resize(intrinsics_.size(), {});
+  p.views.resize(views_.size(), {});
+  return p;
+}
+
+CameraFromTable RigModel::NominalCameraFromTable(int view) const {
+  return views_[view].camera_from_station * MakeStationFromTable(views_[view].turntable_rad);
+}
+
+CameraFromTable RigModel::CameraFromTableOf(const RigParameters& p, int view) const {
+  const RigView& v = views_[view];
+  const RigidOf<double> table{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
+  const RigidOf<double> x = CameraChain<double>(v, table, p.epochs[v.epoch], p.aims[v.aim].data(),
+                                                p.axis.data(), p.views[view].data());
+  return CameraFromTable(x.rotation, x.translation);
+}
+
+CameraFromModel RigModel::CameraFromModelOf(const RigParameters& p, int view) const {
+  const RigView& v = views_[view];
+  const RigidOf<double> x = CameraFromModelChain<double>(
+      v, start_[v.mounting], p.mountings[v.mounting].data(), p.epochs[v.epoch],
+      p.aims[v.aim].data(), p.axis.data(), p.views[view].data(), p.log_ct_scale);
+  return CameraFromModel(x.rotation, x.translation);
+}
+
+TableFromModel RigModel::TableFromModelOf(const RigParameters& p, int mounting) const {
+  const RigidOf<double> x =
+      TableFromModelChain<double>(start_[mounting], p.mountings[mounting].data());
+  return TableFromModel(x.rotation, x.translation);
+}
+
+Intrinsics RigModel::IntrinsicsOf(const RigParameters& p, int lens) const {
+  Intrinsics in = intrinsics_[lens];
+  const auto& d = p.lenses[lens];
+  in.fl_x *= std::exp(d[0]);
+  in.fl_y *= std::exp(d[0]);
+  in.cx += d[1];
+  in.cy += d[2];
+  return in;
+}
+
+}  // namespace scan

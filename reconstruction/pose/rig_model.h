@@ -1,0 +1,110 @@
+// The station as a chain of transforms with Gaussian priors: where every camera must be, given a
+// few shared unknowns.
+//
+//   camera_from_model(view) = Exp(view) . Exp(aim) . camera_from_station(nominal)
+//                           . lift(dlift) . axis . Rz(turntable + epoch + dturntable)
+//                           . Exp(mounting) . table_from_model(start)
+//
+// where Exp(x) stands for x -> Exp(w) x + rho. One turntable offset per reference epoch, one camera
+// deviation per aim, one tilted and shifted axis, one placing per mounting; per view a deviation of
+// the logged axes and of the camera.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "acquisition/session/photo_set.h"
+#include "drivers/base/frames.h"
+#include "drivers/base/intrinsics.h"
+#include "drivers/base/units.h"
+#include "reconstruction/pose/rigid_motion.h"
+
+namespace scan {
+
+using CameraFromStation = Transform<frame::Camera, frame::Station>;
+
+// Prior standard deviations that no session logs.
+struct RigPriors {
+  double axis_tilt_rad =
+      0.5 * kPi / 180;  // turntable axis against the lift, each of two components
+  double axis_shift_mm = 0.5;
+  double mask_bias_px = 1.0;  // full size; outward positive
+  double ct_scale_rel = 1e-4;
+  double mounting_rotation_rad = 1.0;  // about the start; wide, keeps every direction finite
+  double mounting_translation_mm = 100;
+  // Each view's camera moves at least this much of its own: what the static rig model leaves out
+  // (wobble of the bearing, stiffness of the column).
+  RigidSigma view_floor{0.01 * kPi / 180, 0.02};
+};
+
+// Deviations from the nominal rig; all zero is the nominal rig at the start placing.
+struct RigParameters {
+  std::vector<std::array<double, 6>> mountings;  // w rad, rho mm in the table frame
+  std::vector<double> epochs;                    // turntable offset, rad
+  std::vector<std::array<double, 6>> aims;       // w rad, rho mm in the camera frame
+  std::array<double, 4> axis{};                  // tilt about x, y rad; shift along x, y mm
+  std::vector<std::array<double, 3>> lenses;     // log focal length, principal point px
+  // Per view: turntable rad, lift mm; then the camera's own w rad, rho mm.
+  std::vector<std::array<double, 8>> views;
+  double mask_bias_px = 0;
+  double log_ct_scale = 0;
+};
+
+// What a view takes from the shared unknowns.
+struct RigView {
+  int mounting = 0, epoch = 0, aim = 0, lens = 0;
+  bool logged = false;  // a nominal pose exists
+  bool turns = false;   // a logged turntable angle exists
+  // Nominal, at the logged lift: camera_from_table(nominal) . Rz(-turntable).
+  CameraFromStation camera_from_station;
+  double turntable_rad = 0;
+  Eigen::Vector3d lift_direction = Eigen::Vector3d::UnitZ();  // in the station frame
+  double sigma_turntable_rad = 0, sigma_lift_mm = 0;
+  RigidSigma sigma_camera;
+};
+
+class RigModel {
+ public:
+  // Views without a nominal pose have `logged` = false and take no part.
+  RigModel(const PhotoSet& photos, const RigPriors& priors);
+
+  const RigPriors& priors() const { return priors_; }
+  std::span<const RigView> views() const { return views_; }
+  const std::vector<std::string>& mounting_ids() const { return mounting_ids_; }
+  const std::vector<int>& epoch_ids() const { return epoch_ids_; }
+  double epoch_sigma_rad(int epoch) const { return epoch_sigma_rad_[epoch]; }
+  const std::vector<RigidSigma>& aim_sigma() const { return aim_sigma_; }
+  const std::vector<IntrinsicsSigma>& lens_sigma() const { return lens_sigma_; }
+  const Intrinsics& nominal_intrinsics(int lens) const { return intrinsics_[lens]; }
+
+  void set_start(int mounting, const TableFromModel& table_from_model) {
+    start_[mounting] = table_from_model;
+  }
+  const TableFromModel& start(int mounting) const { return start_[mounting]; }
+
+  RigParameters Nominal() const;
+
+  CameraFromTable NominalCameraFromTable(int view) const;
+  CameraFromTable CameraFromTableOf(const RigParameters& parameters, int view) const;
+  // Rigid in the mesh's own mm: a CT scale s is divided out of the translation.
+  CameraFromModel CameraFromModelOf(const RigParameters& parameters, int view) const;
+  TableFromModel TableFromModelOf(const RigParameters& parameters, int mounting) const;
+  Intrinsics IntrinsicsOf(const RigParameters& parameters, int lens) const;
+
+ private:
+  RigPriors priors_;
+  std::vector<RigView> views_;
+  std::vector<std::string> mounting_ids_;
+  std::vector<int> epoch_ids_;
+  std::vector<double> epoch_sigma_rad_;
+  std::vector<RigidSigma> aim_sigma_;
+  std::vector<IntrinsicsSigma> lens_sigma_;
+  std::vector<Intrinsics> intrinsics_;
+  std::vector<TableFromModel> start_;
+};
+
+}  // namespace scan

@@ -1,0 +1,172 @@
+#include "reconstruction/pose/solve_joint.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "reconstruction/pose/joint_result.h"
+#include "reconstruction/pose/picture_cost.h"
+#include "reconstruction/pose/pose_input.h"
+
+namespace scan {
+namespace {
+
+RefineOptions ScaledTo(RefineOptions options, int width) {
+  const double scale = width / 1848.0;
+  options.first_window_px *= scale;
+  options.last_window_px = std::max(4.0, options.last_window_px * scale);
+  options.spacing_px = std::max(2.0, options.spacing_px * scale);
+  options.correlation_px *= scale;
+  return options;
+}
+
+std::vector<PhotoContour> PhotoContours(std::span<const Mask> masks) {
+  std::vector<PhotoContour> photos(masks.size());
+  tbb::parallel_for(std::size_t{0}, masks.size(),
+                    [&](std::size_t i) { photos[i] = MakePhotoContour(masks[i]); });
+  return photos;
+}
+
+double ScaleOf(const PhotoSet& photos) {
+  return photos.intrinsics(photos.photos.front()).w / 1848.0;
+}
+
+// A view's own deviations in units of their priors.
+double ViewPriorChi2(const RigPosterior& posterior, const RigParameters& parameters, int view) {
+  double chi2 = 0;
+  for (int k = 0; k < 8; ++k) {
+    const double u =
+        parameters.views[view][k] / posterior.prior_sigma[posterior.layout.view(view) + k];
+    chi2 += u * u;
+  }
+  return chi2;
+}
+
+// The scale of residuals that views agree on: the median of theirs.
+double PooledSigma(std::span<const ViewFit> fits, const std::vector<bool>& use) {
+  std::vector<double> sigma;
+  for (std::size_t i = 0; i < fits.size(); ++i)
+    if (use[i]) sigma.push_back(fits[i].sigma_px);
+  if (sigma.empty()) return 0;
+  std::sort(sigma.begin(), sigma.end());
+  return sigma[sigma.size() / 2];
+}
+
+struct Judgement {
+  Explained explained;
+  std::string reason;
+};
+
+std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
+                             std::span<const PhotoContour> photos, const RefineResult& fit,
+                             const std::vector<bool>& use, const JointOptions& options,
+                             double scale, double spacing_px) {
+  const RigPosterior posterior = PosteriorOf(rig, fit);
+  const double tolerance_px =
+      options.acceptance.sigmas *
+      std::max(PooledSigma(fit.fits, use), scale * options.acceptance.sigma_floor_px);
+  std::vector<Judgement> judgements(photos.size());
+  tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
+    const int view = static_cast<int>(i);
+    Judgement& judgement = judgements[i];
+    if (photos[i].empty()) {
+      judgement.reason = "the mask is empty: no specimen was found in the photograph";
+      return;
+    }
+    if (!rig.views()[i].logged) {
+      judgement.reason =
+          "no nominal pose: neither turntable and lift were logged nor a "
+          "transform_matrix given";
+      return;
+    }
+    const ViewState state{rig.CameraFromModelOf(fit.parameters, view),
+                          rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens),
+                          fit.parameters.mask_bias_px};
+    judgement.explained = ExplainedShares(mesh, photos[i], state, tolerance_px, spacing_px);
+    judgement.reason = RejectionReason(
+        judgement.explained, ViewPriorChi2(posterior, fit.parameters, view), options.acceptance);
+  });
+  return judgements;
+}
+
+Poses Describe(const TriangleMesh& mesh, const ContourMesh& contour_mesh, const PhotoSet& photos,
+               std::span<const Mask> masks, const RigModel& rig, const RefineResult& fit,
+               std::span<const Judgement> judgements, const JointOptions& options) {
+  Poses poses;
+  poses.method = "joint";
+  poses.model = options.model;
+  const RigPosterior posterior = PosteriorOf(rig, fit);
+  DescribeShared(photos, rig, posterior, fit.parameters, poses);
+  poses.views.resize(photos.photos.size());
+  tbb::parallel_for(std::size_t{0}, photos.photos.size(), [&](std::size_t i) {
+    const int index = static_cast<int>(i);
+    const Photo& photo = photos.photos[i];
+    ViewPose& view = poses.views[i];
+    view.name = photo.name;
+    view.aim = photos.aims[photo.aim].id;
+    view.lens_state = photos.lens_states[photos.aims[photo.aim].lens_state].id;
+    view.mounting = photo.mounting_id;
+    view.reason = judgements[i].reason;
+    view.status = view.reason.empty() ? ViewStatus::accepted : ViewStatus::rejected;
+    view.contour_rms_px = judgements[i].explained.rms_px;
+    if (!rig.views()[i].logged) {
+      view.covariance = 1e6 * Matrix6d::Identity();
+      return;
+    }
+    view.camera_from_model = rig.CameraFromModelOf(fit.parameters, index);
+    const Intrinsics intrinsics = rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens);
+    const EvidenceMatrix covariance = ViewCovariance(rig, posterior, fit.parameters, index);
+    view.covariance = covariance.topLeftCorner<6, 6>();
+    view.surface_sigma_px =
+        SurfaceSigmaOf(contour_mesh, view.camera_from_model, intrinsics, covariance);
+    const ReducedPicture picture = ReducePicture(masks[i], intrinsics);
+    if (picture.empty()) return;
+    const PictureCost cost = CostOfPose(picture, mesh, view.camera_from_model);
+    view.cost_px = cost.l2_px;
+    view.cost_l1_px = cost.l1_px;
+  });
+  return poses;
+}
+
+}  // namespace
+
+Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
+                         std::span<const Mask> masks, const JointOptions& options,
+                         const ProgressFn& progress, std::stop_token stop) {
+  SCAN_CHECK(CheckPoseInput(mesh, photos, masks));
+  RigModel rig(photos, options.rig);
+  const std::vector<PhotoContour> contours = PhotoContours(masks);
+  std::vector<bool> use(contours.size());
+  for (std::size_t i = 0; i < use.size(); ++i)
+    use[i] = rig.views()[i].logged && !contours[i].empty();
+  if (std::none_of(use.begin(), use.end(), [](bool u) { return u; }))
+    return BadInput("no photograph with a nominal pose shows a specimen", "session",
+                    "log turntable and lift or give transform_matrix, and check the masks");
+
+  const ContourMesh contour_mesh(mesh);
+  for (std::size_t m = 0; m < rig.mounting_ids().size(); ++m) {
+    const auto known = options.table_from_model.find(rig.mounting_ids()[m]);
+    if (known != options.table_from_model.end()) rig.set_start(static_cast<int>(m), known->second);
+  }
+  const double scale = ScaleOf(photos);
+  const RefineOptions refine = ScaledTo(options.refine, photos.intrinsics(photos.photos.front()).w);
+  Report(progress, "poses: refine", 0.5);
+  RefineResult fit = RefineJoint(contour_mesh, rig, contours, use, rig.Nominal(), refine, stop);
+  auto judgements = Judge(contour_mesh, rig, contours, fit, use, options, scale, refine.spacing_px);
+  // Views that disagree are taken out and the others solved again, so that nothing of them is
+  // spread; then every view is judged once more at the pose that the others give it.
+  std::vector<bool> agree = use;
+  for (std::size_t i = 0; i < use.size(); ++i) agree[i] = use[i] && judgements[i].reason.empty();
+  if (agree != use && std::any_of(agree.begin(), agree.end(), [](bool a) { return a; })) {
+    RefineOptions again = refine;
+    again.first_window_px = 2 * refine.last_window_px;
+    fit = RefineJoint(contour_mesh, rig, contours, agree, fit.parameters, again, stop);
+    judgements = Judge(contour_mesh, rig, contours, fit, agree, options, scale, refine.spacing_px);
+  }
+  if (stop.stop_requested()) return Cancelled("pose");
+  Report(progress, "poses: uncertainty", 0.9);
+  return Describe(mesh, contour_mesh, photos, masks, rig, fit, judgements, options);
+}
+
+}  // namespace scan

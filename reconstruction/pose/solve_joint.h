@@ -1,0 +1,40 @@
+// All photographs of a session solved together with the rig: logged poses as priors, silhouettes as
+// evidence, uncertainty reported.
+#pragma once
+
+#include <map>
+#include <span>
+#include <stop_token>
+#include <string>
+
+#include "acquisition/session/photo_set.h"
+#include "drivers/base/progress.h"
+#include "drivers/base/result.h"
+#include "reconstruction/masks/mask.h"
+#include "reconstruction/mesh/mesh.h"
+#include "reconstruction/pose/acceptance.h"
+#include "reconstruction/pose/joint_refine.h"
+#include "reconstruction/pose/poses.h"
+#include "reconstruction/pose/rig_model.h"
+
+namespace scan {
+
+struct JointOptions {
+  std::string model;  // the mesh file's name, for the result
+  RigPriors rig;
+  RefineOptions refine;  // px of a picture 1848 px wide; scaled to the photos
+  AcceptanceOptions acceptance;
+  // Known placings by mounting id; the start search runs for the others.
+  std::map<std::string, TableFromModel> table_from_model;
+};
+
+// Finds camera_from_model of every photograph.
+// `masks`: one per photo, in order; an empty mask rejects its view. The mesh is in mm, model frame.
+// Errors: bad_input for a mesh without faces or with NaN vertices, no photos, a number or size of
+// masks that does not match, no mask with a specimen, no nominal pose; cancelled.
+// Thread contract: pure; parallel inside; the same bytes for any number of threads.
+Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
+                         std::span<const Mask> masks, const JointOptions& options,
+                         const ProgressFn& progress = {}, std::stop_token stop = {});
+
+}  // namespace scan

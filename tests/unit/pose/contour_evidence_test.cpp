@@ -1,0 +1,80 @@
+#include "reconstruction/pose/contour_evidence.h"
+
+#include <gtest/gtest.h>
+
+#include "drivers/base/units.h"
+#include "pose_scene.h"
+#include "reconstruction/pose/rigid_motion.h"
+
+namespace scan {
+namespace {
+
+ViewState SomeState() {
+  ViewState state;
+  state.camera_from_model = CameraFromModel(ExpSo3({0.3, -1.1, 0.7}), Eigen::Vector3d(4, -7, 520));
+  state.intrinsics = {1848, 1224, 5480, 5470, 930, 600, 0.05, -0.02, 0.001, -0.002, 0.01};
+  state.mask_bias_px = 0.4;
+  return state;
+}
+
+// The state after a small change of what a residual depends on.
+ViewState Changed(ViewState state, const EvidenceVector& y, const Eigen::Vector3d& pivot) {
+  state.camera_from_model = MovedAbout(state.camera_from_model, Vector6d(y.head<6>()), pivot);
+  state.intrinsics.fl_x *= std::exp(y[6]);
+  state.intrinsics.fl_y *= std::exp(y[6]);
+  state.intrinsics.cx += y[7];
+  state.intrinsics.cy += y[8];
+  state.mask_bias_px += y[9];
+  return state;
+}
+
+TEST(ContourResidual, DerivativeAgreesWithDifferences) {
+  const ViewState state = SomeState();
+  const Eigen::Vector3d point(8, -5, 6), pivot = state.camera_from_model * Eigen::Vector3d(1, 2, 3);
+  const Eigen::Vector2d target(900, 640), normal = Eigen::Vector2d(0.6, -0.8);
+  EvidenceVector analytic;
+  ContourResidual(state, point, target, normal, pivot, &analytic);
+  for (int k = 0; k < kEvidenceSize; ++k) {
+    const double h = k < 3 || k == 6 ? 1e-6 : 1e-3;
+    const EvidenceVector step = h * EvidenceVector::Unit(k);
+    const double up =
+        ContourResidual(Changed(state, step, pivot), point, target, normal, pivot, nullptr);
+    const double down =
+        ContourResidual(Changed(state, -step, pivot), point, target, normal, pivot, nullptr);
+    EXPECT_NEAR(analytic[k], (up - down) / (2 * h), 1e-5 * (1 + std::abs(analytic[k]))) << k;
+  }
+}
+
+TEST(MatchContour, FindsTheBiasOfTheMaskAndTheShiftOfThePicture) {
+  const TriangleMesh mesh = test::BugMesh(3);
+  const ContourMesh contour_mesh(mesh);
+  ViewState state;
+  state.camera_from_model = CameraFromModel(ExpSo3({1.7, 0.2, 0.4}), Eigen::Vector3d(0, 0, 550));
+  state.intrinsics = {924, 612, 2740, 2740, 462, 306, 0, 0, 0, 0, 0};
+  const PhotoContour photo =
+      MakePhotoContour(test::RenderMask(mesh, state.camera_from_model, state.intrinsics));
+  state.intrinsics.cx += 3;  // the model's picture lies 3 px to the right of the photo's
+  const auto samples =
+      FindContourSamples(contour_mesh, state.camera_from_model, state.intrinsics, 2);
+  const MatchResult match = MatchContour(samples, photo, 0.0, 12);
+  ASSERT_GT(match.matches.size(), 100u);
+  double error = 0;
+  for (const ContourMatch& m : match.matches) error += std::abs(m.residual_px + 3 * m.normal.x());
+  EXPECT_LT(error / static_cast<double>(match.matches.size()), 0.3);
+}
+
+TEST(MatchContour, TheFarSideOfAThinLegIsNoPartner) {
+  // A strip 4 px wide; a sample on its left edge, moved 3 px to the right, must find the left edge.
+  Mask mask;
+  mask.coverage = cv::Mat(60, 60, CV_8U, cv::Scalar(0));
+  mask.coverage(cv::Rect(28, 5, 4, 50)) = cv::Scalar(255);
+  const PhotoContour photo = MakePhotoContour(mask);
+  const ContourSample sample{Eigen::Vector3d::Zero(), {31, 30}, {-1, 0}, {0, 1}, 2};
+  const MatchResult match = MatchContour(std::span(&sample, 1), photo, 0, 10);
+  ASSERT_EQ(match.matches.size(), 1u);
+  EXPECT_NEAR(match.matches[0].target.x(), 28, 0.51);
+  EXPECT_NEAR(match.matches[0].residual_px, 3, 0.51);
+}
+
+}  // namespace
+}  // namespace scan

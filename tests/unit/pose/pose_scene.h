@@ -1,0 +1,45 @@
+// A small synthetic session with known truth: photographs' masks of a mesh on an imperfect rig.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "acquisition/session/photo_set.h"
+#include "reconstruction/masks/mask.h"
+#include "reconstruction/mesh/mesh.h"
+
+namespace scan::test {
+
+struct SceneOptions {
+  int w = 1848, h = 1224;
+  int views = 24;  // over two aims when even
+  std::vector<double> elevations_deg{15, 45};
+  double focal_mm = 70, sensor_mm = 23.6, radius_mm = 550;
+  bool static_errors =
+      false;  // focal 0.05 %, principal point 3 px, axis 0.5 deg, aims 0.2 deg 0.5 mm
+  double mask_bias_px = 0;
+  std::uint64_t seed = 1;
+};
+
+struct Scene {
+  PhotoSet photos;
+  std::vector<Mask> masks;
+  TableFromModel table_from_model;  // true
+  std::vector<CameraFromModel> truth;
+  std::vector<Intrinsics> true_intrinsics;  // per photo
+};
+
+// Anti-aliased coverage of the mesh, 8 x 8 samples a pixel.
+Mask RenderMask(const TriangleMesh& mesh, const CameraFromModel& camera_from_model,
+                const Intrinsics& intrinsics);
+
+Scene MakeScene(const TriangleMesh& mesh, const TableFromModel& table_from_model,
+                const SceneOptions& options);
+
+// An egg-shaped body with a horn and five unequal legs, 30 mm long: overlapping closed shells.
+TriangleMesh BugMesh(int subdivisions);
+
+// A closed body of revolution about an axis that is not a coordinate axis; `facets` around.
+TriangleMesh RevolutionMesh(int facets, const Eigen::Vector3d& axis);
+
+}  // namespace scan::test
