@@ -11,6 +11,7 @@ find_package(CLI11 REQUIRED)
 find_package(OpenSSL REQUIRED)
 find_package(JPEG REQUIRED)
 find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs)
+pkg_check_modules(libexif REQUIRED IMPORTED_TARGET libexif)
 
 if(SCAN_RECONSTRUCTION)
   find_package(TBB REQUIRED)

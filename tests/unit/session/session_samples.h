@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
