@@ -243,7 +243,7 @@ TEST_F(Import, FocalLengthFromExif) {
 TEST_F(Import, NoMutationOfTheTransformsCrashes) {
   const std::string good = transforms_.dump(1);
   Rng rng(2);
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 120; ++round) {
     std::string text = good;
     for (std::uint64_t edits = 1 + rng.Below(2); edits > 0; --edits) {
       const std::size_t at = rng.Below(text.size());
