@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 
 const std::vector<FileDocument>* FilesOf(const LogEntry& entry) {
   if (const auto* frame = std::get_if<FrameEntry>(&entry.payload)) return &frame->files;
+  if (const auto* reject = std::get_if<RejectEntry>(&entry.payload)) return &reject->files;
   const auto* note = std::get_if<NoteEntry>(&entry.payload);
   return note && note->plate ? &note->plate->files : nullptr;
 }

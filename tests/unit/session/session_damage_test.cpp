@@ -94,8 +94,8 @@ TEST(SessionDamage, AWriterThatFailedOnceWritesNoMore) {
   auto writer = SessionWriter::Create(std::make_unique<FaultySink>(temp.path() / "s", 6),
                                       SampleDocument(), Time(0));
   ASSERT_TRUE(IsOk(writer));
-  EXPECT_FALSE(writer->Append(NoteEntry{"first", {}}, Time(1)));
-  const auto second = writer->Append(NoteEntry{"second", {}}, Time(1));
+  EXPECT_FALSE(writer->Append(NoteEntry{"first", {}, {}}, Time(1)));
+  const auto second = writer->Append(NoteEntry{"second", {}, {}}, Time(1));
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().mend, "resume the session");
 }
@@ -172,6 +172,21 @@ TEST(SessionVerify, FindsEveryKindOfDamage) {
   });
   ASSERT_EQ(edited.problems.size(), 1u);
   EXPECT_NE(edited.problems[0].where.find("session_sha256"), std::string::npos);
+  const auto rejected = damaged([&] {
+    auto writer = ResumeSession(folder, Time(90));
+    ASSERT_TRUE(IsOk(writer));
+    RejectEntry reject;
+    reject.view = "v000";
+    reject.camera = "c0";
+    const std::vector<EncodedFile> pictures = {{"png", SamplePng(16, 12, 3)}};
+    ASSERT_TRUE(IsOk(writer->AppendReject(reject, pictures, Time(91))));
+    int removed = 0;
+    for (const auto& file : fs::directory_iterator(folder / "frames"))
+      if (file.path().filename().string().starts_with("rejected_"))
+        removed += fs::remove(file.path());
+    EXPECT_EQ(removed, 1);
+  });
+  EXPECT_EQ(rejected.problems.size(), 1u);
   const auto no_log = damaged([&] { fs::remove(folder / "log.jsonl"); });
   EXPECT_TRUE(no_log.sound());
   EXPECT_EQ(no_log.views_missing.size(), 2u);

@@ -81,14 +81,28 @@ TEST(LogDocument, EveryTypeReadsBack) {
                  {"frames/v001_c0.nef", 13, std::string(64, 'b')}};
   frame.camera_from_table = CameraFromTable(pose);
   frame.prior_sigma_view = {0.1, 0.2};
-  const PlateDocument plate = {PlateKind::chart, "c0", "", {frame.files[0]}, {}};
+  const FileDocument picture = {"frames/rejected_v001_c0_0.png", 12, std::string(64, 'd')};
+  const RejectEntry reject = {"v001",
+                              "",
+                              "c0",
+                              0,
+                              "blurred \"badly\"\n",
+                              "settings",
+                              {picture},
+                              5,
+                              ExposureBound{1, 2},
+                              AppliedSettings{900.0, {}}};
+  const FaultEntry fault = {"motion",          "lost steps", "home", "axis",
+                            ErrorKind::device, "v001",       "move"};
+  const PlateDocument plate = {PlateKind::chart,   "c0", "", {frame.files[0]}, {}, 8,
+                               ExposureBound{3, 4}};
   const std::vector<LogPayload> payloads = {
       StartEntry{std::string(64, '0')},
       HomeEntry{2, SamplePosition()},
       MoveEntry{"v001", {15, 120.5, "a1"}},
       SettleEntry{77, SamplePosition()},
       frame,
-      RejectEntry{"v001", "c0", 0, "blurred \"badly\"\n"},
+      reject,
       RetryEntry{"v001", "c0", 0, 2, "late"},
       RetakeEntry{4, "v001", "c0", 0, "dust"},
       PlanExtendEntry{SampleDocument().views},
@@ -97,8 +111,8 @@ TEST(LogDocument, EveryTypeReadsBack) {
       PauseEntry{"lunch"},
       ResumeEntry{"done"},
       StopEntry{StopKind::emergency_stop, "smoke"},
-      FaultEntry{"motion", "lost steps", "home"},
-      NoteEntry{"a plate", plate},
+      fault,
+      NoteEntry{"a plate", plate, {{"key", "value"}}},
       EndEntry{EndResult::stopped, "enough"}};
   ASSERT_EQ(payloads.size(), std::variant_size_v<LogPayload>);
   for (std::size_t i = 0; i < payloads.size(); ++i) {
