@@ -19,6 +19,8 @@ if(SCAN_RECONSTRUCTION)
   find_package(Ceres REQUIRED)
   set(CGAL_DO_NOT_WARN_ABOUT_CMAKE_BUILD_TYPE TRUE)
   find_package(CGAL REQUIRED)
+  find_package(ITK 5.2 REQUIRED COMPONENTS
+               ITKIOGDCM ITKIOMeta ITKIONIFTI ITKIONRRD ITKIOPNG ITKIOTIFF)
   find_package(TinyGLTF REQUIRED)
   include(CGAL_Eigen3_support)
   find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs calib3d)

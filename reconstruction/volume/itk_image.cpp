@@ -1,0 +1,238 @@
+#include "reconstruction/volume/itk_image.h"
+
+#include <fmt/format.h>
+#include <itkGDCMImageIO.h>
+#include <itkGDCMSeriesFileNames.h>
+#include <itkImage.h>
+#include <itkImageFileReader.h>
+#include <itkImageSeriesReader.h>
+#include <itkMetaDataObject.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+#include <itkPNGImageIO.h>
+#include <itkTIFFImageIO.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+
+namespace scan {
+namespace {
+
+namespace fs = std::filesystem;
+using Image3 = itk::Image<float, 3>;
+using Image2 = itk::Image<float, 2>;
+
+itk::ImageIOBase::Pointer MakeIo(VolumeFormat format) {
+  switch (format) {
+    case VolumeFormat::metaimage: return itk::MetaImageIO::New().GetPointer();
+    case VolumeFormat::nrrd: return itk::NrrdImageIO::New().GetPointer();
+    case VolumeFormat::nifti: return itk::NiftiImageIO::New().GetPointer();
+    case VolumeFormat::tiff: return itk::TIFFImageIO::New().GetPointer();
+    case VolumeFormat::png: return itk::PNGImageIO::New().GetPointer();
+  }
+  return {};
+}
+
+// Third parties' exceptions end here: one bad_input line each.
+template <class Fn>
+auto Guarded(const fs::path& path, Fn&& fn) -> decltype(fn()) {
+  itk::Object::SetGlobalWarningDisplay(false);
+  const auto unreadable = [&](std::string why) {
+    std::replace(why.begin(), why.end(), '\n', ' ');
+    return BadInput("cannot be read as a volume (" + why + ")", path.string(),
+                    "check that the file is whole and of the format its name says");
+  };
+  try {
+    return fn();
+  } catch (const itk::ExceptionObject& e) {
+    return unreadable(e.GetDescription());
+  } catch (const std::bad_alloc&) {
+    return unreadable("not enough memory");
+  } catch (const std::exception& e) {
+    return unreadable(e.what());
+  }
+}
+
+Status CheckGrey(const itk::ImageIOBase& io, const fs::path& path) {
+  if (io.GetNumberOfComponents() == 1) return {};
+  return BadInput(fmt::format("{} values a voxel (colour or vectors)", io.GetNumberOfComponents()),
+                  path.string(), "convert it to single grey values");
+}
+
+// Twice the floats must fit: the reader holds the file's own type beside them.
+Status CheckMemory(double voxels, const fs::path& path) {
+  const double memory = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) *
+                        static_cast<double>(::sysconf(_SC_PAGE_SIZE));
+  if (voxels * 2 * sizeof(float) < memory) return {};
+  return BadInput(fmt::format("{:.3g} voxels do not fit into the memory of this machine", voxels),
+                  path.string(), "check the size in the header, or reduce the volume");
+}
+
+// The data of an uncompressed file cannot be larger than the file: a header that claims more would
+// be filled with zeros by some readers.
+Status CheckBytes(const itk::ImageIOBase& io, const fs::path& path, bool compressed) {
+  std::error_code code;
+  const auto bytes = fs::file_size(path, code);
+  if (code || compressed || static_cast<std::uintmax_t>(io.GetImageSizeInBytes()) <= bytes)
+    return {};
+  return BadInput(fmt::format("the file is truncated: {} bytes of {} are there", bytes,
+                              io.GetImageSizeInBytes()),
+                  path.string(), "copy it again");
+}
+
+std::string HeaderText(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(16384, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text;
+}
+
+struct HeaderFacts {
+  bool has_spacing = false;
+  bool own_bytes_raw = false;  // the data lie uncompressed in this very file
+};
+
+HeaderFacts ReadHeaderFacts(const fs::path& path, VolumeFormat format) {
+  std::string text = HeaderText(path);
+  const auto has = [&](std::string_view word) { return text.find(word) != std::string::npos; };
+  switch (format) {
+    case VolumeFormat::metaimage:
+      text.resize(std::min(text.size(), text.find("ElementDataFile") + 60));
+      return {has("ElementSpacing") || has("ElementSize"),
+              has("LOCAL") && !has("CompressedData = True")};
+    case VolumeFormat::nrrd:
+      text.resize(std::min(text.size(), text.find("\n\n")));
+      return {(has("spacings:") || has("space directions:")) && !has("spacings: nan"),
+              has("encoding: raw") && !has("data file:") && !has("datafile:")};
+    case VolumeFormat::nifti:
+      return {true, path.extension() == ".nii"};
+    default: return {};
+  }
+}
+
+Volume CopyOut(const Image3& image) {
+  Volume volume;
+  const auto size = image.GetLargestPossibleRegion().GetSize();
+  for (unsigned a = 0; a < 3; ++a) {
+    volume.size[a] = size[a];
+    volume.spacing_mm[a] = image.GetSpacing()[a];
+    volume.origin_mm[a] = image.GetOrigin()[a];
+    for (unsigned b = 0; b < 3; ++b) volume.direction(a, b) = image.GetDirection()[a][b];
+  }
+  const float* grey = image.GetBufferPointer();
+  volume.grey.assign(grey, grey + volume.voxels());
+  return volume;
+}
+
+Status CheckDimensions(const itk::ImageIOBase& io, const fs::path& path) {
+  double voxels = 1;
+  for (unsigned a = 0; a < io.GetNumberOfDimensions(); ++a) {
+    voxels *= static_cast<double>(io.GetDimensions(a));
+    if (a >= 3 && io.GetDimensions(a) > 1)
+      return BadInput("more than three dimensions", path.string(), "extract one volume of it");
+  }
+  return CheckMemory(voxels, path);
+}
+
+}  // namespace
+
+Result<FileVolume> ReadVolumeFile(const fs::path& path, VolumeFormat format) {
+  return Guarded(path, [&]() -> Result<FileVolume> {
+    const HeaderFacts facts = ReadHeaderFacts(path, format);
+    auto io = MakeIo(format);
+    if (!io->CanReadFile(path.c_str()))
+      return BadInput("is not of the format its name says", path.string(),
+                      "check the file, or give it its right extension");
+    io->SetFileName(path.string());
+    io->ReadImageInformation();
+    SCAN_CHECK(CheckGrey(*io, path));
+    SCAN_CHECK(CheckDimensions(*io, path));
+    SCAN_CHECK(CheckBytes(*io, path, !facts.own_bytes_raw));
+    auto reader = itk::ImageFileReader<Image3>::New();
+    reader->SetImageIO(io);
+    reader->SetFileName(path.string());
+    reader->Update();
+    return FileVolume{CopyOut(*reader->GetOutput()), facts.has_spacing};
+  });
+}
+
+Result<FileVolume> ReadSlices(const std::vector<fs::path>& slices, VolumeFormat format) {
+  FileVolume out;
+  Volume& volume = out.volume;
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    const fs::path& path = slices[k];
+    const Status done = Guarded(path, [&]() -> Status {
+      auto io = MakeIo(format);
+      if (!io->CanReadFile(path.c_str()))
+        return BadInput("is not of the format its name says", path.string(),
+                        "check the file, or remove it from the folder");
+      io->SetFileName(path.string());
+      io->ReadImageInformation();
+      SCAN_CHECK(CheckGrey(*io, path));
+      const std::size_t w = io->GetDimensions(0), h = io->GetDimensions(1);
+      if (k == 0) {
+        volume.size = {w, h, slices.size()};
+        SCAN_CHECK(CheckMemory(static_cast<double>(w) * static_cast<double>(h) *
+                                   static_cast<double>(slices.size()), path));
+        volume.grey.resize(volume.voxels());
+      }
+      if (w != volume.size[0] || h != volume.size[1] ||
+          (io->GetNumberOfDimensions() > 2 && io->GetDimensions(2) > 1))
+        return BadInput(fmt::format("slice of {} x {} instead of {} x {}", w, h, volume.size[0],
+                                    volume.size[1]),
+                        path.string(), "all slices of a folder must have one size");
+      auto reader = itk::ImageFileReader<Image2>::New();
+      reader->SetImageIO(io);
+      reader->SetFileName(path.string());
+      reader->Update();
+      std::copy_n(reader->GetOutput()->GetBufferPointer(), w * h, &volume.grey[k * w * h]);
+      return {};
+    });
+    SCAN_CHECK(done);
+  }
+  return out;
+}
+
+Result<FileVolume> ReadDicomSeries(const fs::path& folder) {
+  return Guarded(folder, [&]() -> Result<FileVolume> {
+    auto names = itk::GDCMSeriesFileNames::New();
+    names->SetGlobalWarningDisplay(false);
+    names->SetDirectory(folder.string());
+    const auto series = names->GetSeriesUIDs();
+    if (series.empty())
+      return BadInput("the folder holds no PNG, TIFF or DICOM slices", folder.string(),
+                      "name the volume file, or the folder with the slices");
+    if (series.size() > 1)
+      return BadInput(fmt::format("the folder holds {} DICOM series", series.size()),
+                      folder.string(), "put the wanted series into a folder of its own");
+    const auto files = names->GetFileNames(series.front());
+    auto io = itk::GDCMImageIO::New();
+    io->SetFileName(files.front());
+    io->ReadImageInformation();
+    SCAN_CHECK(CheckGrey(*io, files.front()));
+    SCAN_CHECK(CheckMemory(static_cast<double>(io->GetDimensions(0)) *
+                               static_cast<double>(io->GetDimensions(1)) *
+                               static_cast<double>(files.size()), folder));
+    std::string value;
+    const bool has_spacing =
+        itk::ExposeMetaData<std::string>(io->GetMetaDataDictionary(), "0028|0030", value) ||
+        itk::ExposeMetaData<std::string>(io->GetMetaDataDictionary(), "0018|1164", value);
+    auto reader = itk::ImageSeriesReader<Image3>::New();
+    reader->SetImageIO(io);
+    reader->SetFileNames(files);
+    reader->Update();
+    double deviation = 0;
+    itk::ExposeMetaData<double>(reader->GetOutput()->GetMetaDataDictionary(),
+                                "ITK_non_uniform_sampling_deviation", deviation);
+    if (deviation > 0.01 * reader->GetOutput()->GetSpacing()[2])
+      return BadInput(fmt::format("slices are missing or unevenly spaced (by {:.3g} mm)", deviation),
+                      folder.string(), "export the whole series again");
+    return FileVolume{CopyOut(*reader->GetOutput()), has_spacing};
+  });
+}
+
+}  // namespace scan

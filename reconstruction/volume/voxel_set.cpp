@@ -1,0 +1,161 @@
+#include "reconstruction/volume/voxel_set.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace scan {
+namespace {
+
+// Running window along one axis: out = (any in the window) == `grow`.
+VoxelSet WindowAlong(const VoxelSet& set, int axis, int radius, bool grow) {
+  VoxelSet out{set.size, std::vector<std::uint8_t>(set.inside.size())};
+  const std::size_t strides[3] = {1, set.size[0], set.size[0] * set.size[1]};
+  const int a = axis == 2 ? 0 : axis == 1 ? 0 : 1, b = axis == 2 ? 1 : 2;
+  const std::size_t length = set.size[axis], stride = strides[axis];
+  const std::uint8_t sought = grow ? 1 : 0;
+  tbb::parallel_for(std::size_t{0}, set.size[b], [&](std::size_t outer) {
+    for (std::size_t inner = 0; inner < set.size[a]; ++inner) {
+      const std::size_t base = outer * strides[b] + inner * strides[a];
+      // Distance since the last sought voxel, forward then backward.
+      std::size_t since = radius + 1;
+      for (std::size_t n = 0; n < length; ++n) {
+        since = set.inside[base + n * stride] == sought ? 0 : since + 1;
+        out.inside[base + n * stride] = since <= static_cast<std::size_t>(radius);
+      }
+      since = radius + 1;
+      for (std::size_t n = length; n-- > 0;) {
+        since = set.inside[base + n * stride] == sought ? 0 : since + 1;
+        std::uint8_t& hit = out.inside[base + n * stride];
+        hit = hit || since <= static_cast<std::size_t>(radius);
+        if (!grow) hit = !hit;
+      }
+    }
+  });
+  return out;
+}
+
+VoxelSet Windowed(const VoxelSet& set, int radius, bool grow) {
+  if (radius <= 0) return set;
+  VoxelSet out = WindowAlong(set, 0, radius, grow);
+  out = WindowAlong(out, 1, radius, grow);
+  return WindowAlong(out, 2, radius, grow);
+}
+
+// A row's stretch [begin, end) of voxels inside.
+struct Run {
+  std::uint32_t begin, end;
+};
+
+struct Runs {
+  std::vector<Run> runs;
+  std::vector<std::size_t> first;  // of each row; one more at the end
+};
+
+Runs FindRuns(const VoxelSet& set) {
+  Runs found;
+  const std::size_t rows = set.size[1] * set.size[2];
+  found.first.reserve(rows + 1);
+  for (std::size_t row = 0; row < rows; ++row) {
+    found.first.push_back(found.runs.size());
+    const std::uint8_t* p = set.inside.data() + row * set.size[0];
+    for (std::size_t i = 0; i < set.size[0];) {
+      if (!p[i]) {
+        ++i;
+        continue;
+      }
+      const std::size_t begin = i;
+      while (i < set.size[0] && p[i]) ++i;
+      found.runs.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(i)});
+    }
+  }
+  found.first.push_back(found.runs.size());
+  return found;
+}
+
+std::uint32_t Root(std::vector<std::uint32_t>& parent, std::uint32_t v) {
+  while (parent[v] != v) v = parent[v] = parent[parent[v]];
+  return v;
+}
+
+void JoinRows(const Runs& r, std::size_t row, std::size_t other, std::uint32_t reach,
+              std::vector<std::uint32_t>& parent) {
+  std::size_t a = r.first[row], b = r.first[other];
+  while (a < r.first[row + 1] && b < r.first[other + 1]) {
+    if (r.runs[a].begin < r.runs[b].end + reach && r.runs[b].begin < r.runs[a].end + reach) {
+      const auto ra = Root(parent, static_cast<std::uint32_t>(a));
+      const auto rb = Root(parent, static_cast<std::uint32_t>(b));
+      parent[std::max(ra, rb)] = std::min(ra, rb);
+    }
+    if (r.runs[a].end < r.runs[b].end)
+      ++a;
+    else
+      ++b;
+  }
+}
+
+}  // namespace
+
+std::size_t Count(const VoxelSet& set) {
+  return std::accumulate(set.inside.begin(), set.inside.end(), std::size_t{0});
+}
+
+VoxelSet Dilated(const VoxelSet& set, int radius) { return Windowed(set, radius, true); }
+VoxelSet Eroded(const VoxelSet& set, int radius) { return Windowed(set, radius, false); }
+
+Labelling LabelComponents(const VoxelSet& set, Connectivity connectivity) {
+  const Runs r = FindRuns(set);
+  std::vector<std::uint32_t> parent(r.runs.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  const std::size_t h = set.size[1], d = set.size[2];
+  const bool corners = connectivity == Connectivity::corners;
+  const std::uint32_t reach = corners ? 1 : 0;
+  for (std::size_t k = 0; k < d; ++k)
+    for (std::size_t j = 0; j < h; ++j) {
+      const std::size_t row = j + h * k;
+      if (j > 0) JoinRows(r, row, row - 1, reach, parent);
+      if (k > 0) JoinRows(r, row, row - h, reach, parent);
+      if (corners && k > 0 && j > 0) JoinRows(r, row, row - h - 1, reach, parent);
+      if (corners && k > 0 && j + 1 < h) JoinRows(r, row, row - h + 1, reach, parent);
+    }
+  Labelling out;
+  out.label.assign(set.inside.size(), 0);
+  std::vector<std::uint32_t> label(r.runs.size(), 0);
+  for (std::size_t row = 0; row < h * d; ++row) {
+    const std::size_t j = row % h, k = row / h;
+    const double y = (static_cast<double>(j) + 0.5) / static_cast<double>(h) - 0.5;
+    for (std::size_t n = r.first[row]; n < r.first[row + 1]; ++n) {
+      const std::uint32_t root = Root(parent, static_cast<std::uint32_t>(n));
+      if (!label[root]) {
+        out.components.emplace_back();
+        label[root] = static_cast<std::uint32_t>(out.components.size());
+      }
+      label[n] = label[root];
+      Component& c = out.components[label[n] - 1];
+      const Run run = r.runs[n];
+      c.voxels += run.end - run.begin;
+      c.side_wall |= run.begin == 0 || run.end == set.size[0] || j == 0 || j + 1 == h;
+      c.any_wall |= c.side_wall || k == 0 || k + 1 == d;
+      for (std::uint32_t i = run.begin; i < run.end; ++i) {
+        const double x = (i + 0.5) / static_cast<double>(set.size[0]) - 0.5;
+        c.central += x * x + y * y < 0.25 * 0.25;
+      }
+      std::fill_n(out.label.begin() + static_cast<std::ptrdiff_t>(row * set.size[0] + run.begin),
+                  run.end - run.begin, label[n]);
+    }
+  }
+  return out;
+}
+
+VoxelSet EnclosedCavities(const VoxelSet& set) {
+  VoxelSet air{set.size, std::vector<std::uint8_t>(set.inside.size())};
+  for (std::size_t v = 0; v < air.inside.size(); ++v) air.inside[v] = !set.inside[v];
+  const Labelling labelling = LabelComponents(air, Connectivity::faces);
+  for (std::size_t v = 0; v < air.inside.size(); ++v)
+    if (air.inside[v]) air.inside[v] = !labelling.components[labelling.label[v] - 1].any_wall;
+  return air;
+}
+
+}  // namespace scan
