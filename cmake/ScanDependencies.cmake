@@ -21,6 +21,8 @@ if(SCAN_RECONSTRUCTION)
   find_package(CGAL REQUIRED)
   find_package(ITK 5.2 REQUIRED COMPONENTS
                ITKIOGDCM ITKIOMeta ITKIONIFTI ITKIONRRD ITKIOPNG ITKIOTIFF)
+  find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel FiltersCore)
+  find_package(meshoptimizer REQUIRED)
   find_package(TinyGLTF REQUIRED)
   include(CGAL_Eigen3_support)
   find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs calib3d)

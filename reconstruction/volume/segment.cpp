@@ -11,8 +11,13 @@
 namespace scan {
 namespace {
 
-// A level is taken when the largest component away from the side walls holds this share of it.
-constexpr double kPlausibleShare = 0.2;
+// Plausible component: of what is away from the side walls, and of all that is above the level.
+constexpr double kLeastShareOfRest = 0.5;
+constexpr double kLeastShareOfAll = 0.05;
+// Of the best contrast at a plausible component's surface. Measured: ant in fluid 0.36, its bright
+// gut content alone 0.57, a shading of the fluid 0.18.
+constexpr double kLeastShareOfBestContrast = 0.45;
+constexpr std::size_t kVoxelsToJudge = 2'000'000;
 
 VoxelSet Above(const Volume& volume, double threshold) {
   VoxelSet set{volume.size, std::vector<std::uint8_t>(volume.voxels())};
@@ -129,7 +134,7 @@ Segmentation TakeLargest(const Volume& volume, double threshold, bool drop_side_
     out.small_voxels = total - out.side_wall_voxels - out.voxels;
   }
   out.specimen = Select(above, labelling, wanted);
-  out.levels.push_back({threshold, total, out.voxels});
+  out.voxels_above = total;
   return out;
 }
 
@@ -158,31 +163,112 @@ void FillCavities(int closing_radius, Segmentation& s) {
   s.cavity_voxels = Count(s.filled);
 }
 
-Result<Segmentation> ChooseLevel(const Volume& volume, const SegmentOptions& options,
-                                 const ProgressFn& progress, const std::stop_token& stop) {
-  const std::vector<double> levels =
-      options.threshold ? std::vector{*options.threshold} : OtsuLevels(volume, options.otsu_levels);
-  if (levels.empty())
+// Means over cubes of `factor` voxels a side; what does not fill a cube at the far ends is left out.
+Volume Reduced(const Volume& volume, std::size_t factor) {
+  Volume out;
+  for (int a = 0; a < 3; ++a) out.size[a] = std::max<std::size_t>(1, volume.size[a] / factor);
+  out.grey.resize(out.voxels());
+  tbb::parallel_for(std::size_t{0}, out.size[2], [&](std::size_t k) {
+    for (std::size_t j = 0; j < out.size[1]; ++j)
+      for (std::size_t i = 0; i < out.size[0]; ++i) {
+        double sum = 0;
+        int count = 0;
+        for (std::size_t c = k * factor; c < std::min((k + 1) * factor, volume.size[2]); ++c)
+          for (std::size_t b = j * factor; b < std::min((j + 1) * factor, volume.size[1]); ++b)
+            for (std::size_t a = i * factor; a < std::min((i + 1) * factor, volume.size[0]); ++a)
+              sum += volume.grey[volume.index(a, b, c)], ++count;
+        out.grey[out.index(i, j, k)] = static_cast<float>(sum / count);
+      }
+  });
+  return out;
+}
+
+// Mean grey one voxel inside and one voxel outside of the surface of `set`, along the axes; pairs
+// whose inner voxel is not inside or whose outer one is, count for nothing.
+void MeasureStep(const Volume& volume, const VoxelSet& set, LevelTried& level) {
+  const std::ptrdiff_t strides[3] = {1, static_cast<std::ptrdiff_t>(set.size[0]),
+                                     static_cast<std::ptrdiff_t>(set.size[0] * set.size[1])};
+  double inner = 0, outer = 0, pairs = 0;
+  for (std::size_t k = 0; k < set.size[2]; ++k)
+    for (std::size_t j = 0; j < set.size[1]; ++j)
+      for (std::size_t i = 0; i < set.size[0]; ++i) {
+        const std::size_t v = set.index(i, j, k), at[3] = {i, j, k};
+        if (!set.inside[v]) continue;
+        for (int a = 0; a < 3; ++a) {
+          if (at[a] < 2 || at[a] + 2 >= set.size[a]) continue;
+          for (const std::ptrdiff_t s : {strides[a], -strides[a]}) {
+            const std::uint8_t* p = &set.inside[v];
+            if (p[s] || p[2 * s] || !p[-s]) continue;
+            inner += (&volume.grey[v])[-s];
+            outer += (&volume.grey[v])[2 * s];
+            pairs += 1;
+          }
+        }
+      }
+  if (pairs > 0) level.inner = inner / pairs, level.outer = outer / pairs;
+}
+
+LevelTried Judge(const Volume& volume, double threshold, double darkest,
+                 const SegmentOptions& options) {
+  const Segmentation s =
+      TakeLargest(volume, threshold, options.drop_side_walls, options.opening_radius);
+  LevelTried level{.threshold = threshold,
+                   .above = s.voxels_above,
+                   .wall = s.side_wall_voxels,
+                   .largest = s.voxels};
+  MeasureStep(volume, s.specimen, level);
+  if (level.inner > darkest) level.contrast = (level.inner - level.outer) / (level.inner - darkest);
+  const auto share = [&](std::size_t of) {
+    return static_cast<double>(s.voxels) / static_cast<double>(std::max<std::size_t>(of, 1));
+  };
+  level.plausible = share(s.voxels + s.small_voxels) >= kLeastShareOfRest &&
+                    share(s.voxels_above) >= kLeastShareOfAll && level.contrast > 0;
+  return level;
+}
+
+Result<std::vector<LevelTried>> JudgeLevels(const Volume& volume, const SegmentOptions& options,
+                                            const ProgressFn& progress,
+                                            const std::stop_token& stop) {
+  std::size_t factor = 1;
+  while (volume.voxels() / (factor * factor * factor) > kVoxelsToJudge) ++factor;
+  const Volume reduced = factor > 1 ? Reduced(volume, factor) : volume;
+  std::vector<LevelTried> tried;
+  const std::vector<double> levels = OtsuLevels(volume, 3, 2);
+  const double darkest = levels.empty() ? 0 : MeansAbout(volume, levels.front()).below;
+  for (const double level : levels) {
+    if (stop.stop_requested()) return Cancelled("segmentation");
+    Report(progress, "segment",
+           0.6 * static_cast<double>(tried.size()) / static_cast<double>(levels.size()));
+    tried.push_back(Judge(reduced, level, darkest, options));
+  }
+  return tried;
+}
+
+const LevelTried* BestLevel(const std::vector<LevelTried>& tried) {
+  double best = 0;
+  for (const LevelTried& l : tried)
+    if (l.plausible) best = std::max(best, l.contrast);
+  for (const LevelTried& l : tried)
+    if (l.plausible && l.contrast >= kLeastShareOfBestContrast * best) return &l;
+  return nullptr;
+}
+
+Result<Segmentation> TakeBestLevel(const Volume& volume, const SegmentOptions& options,
+                                   const ProgressFn& progress, const std::stop_token& stop) {
+  SCAN_TRY(std::vector<LevelTried> tried, JudgeLevels(volume, options, progress, stop));
+  if (tried.empty())
     return BadInput("all voxels have the same grey value", "volume",
                     "check that the file holds the scan of a specimen");
-  std::vector<LevelTried> tried;
-  for (std::size_t n = 0; n < levels.size(); ++n) {
-    if (stop.stop_requested()) return Cancelled("segmentation");
-    Report(progress, "segment", 0.8 * static_cast<double>(n) / static_cast<double>(levels.size()));
-    Segmentation s =
-        TakeLargest(volume, levels[n], options.drop_side_walls, options.opening_radius);
-    tried.push_back(s.levels.front());
-    const double share = static_cast<double>(s.voxels) /
-                         static_cast<double>(std::max<std::size_t>(tried.back().above, 1));
-    if (share < kPlausibleShare) continue;
-    s.levels = std::move(tried);
-    return s;
-  }
-  Segmentation s = TakeLargest(volume, levels.front(), false, 0);
-  s.levels = std::move(tried);
-  if (options.drop_side_walls)
+  Segmentation s;
+  if (const LevelTried* best = BestLevel(tried)) {
+    s = TakeLargest(volume, 0.5 * (best->inner + best->outer), options.drop_side_walls,
+                    options.opening_radius);
+  } else {
+    s = TakeLargest(volume, OtsuLevels(volume, 1, 0).front(), false, 0);
     s.notes.push_back(
-        "no threshold separates a component from the side walls: the largest one is kept whole");
+        "no threshold separates a specimen from the side walls: the largest component is kept whole");
+  }
+  s.levels = std::move(tried);
   return s;
 }
 
@@ -192,7 +278,12 @@ Result<Segmentation> Segment(const Volume& volume, const SegmentOptions& options
                              const ProgressFn& progress, std::stop_token stop) {
   if (volume.voxels() == 0 || volume.grey.size() != volume.voxels())
     return BadInput("the volume is empty", "volume", "check the file and its size");
-  SCAN_TRY(Segmentation s, ChooseLevel(volume, options, progress, stop));
+  Segmentation s;
+  if (options.threshold) {
+    s = TakeLargest(volume, *options.threshold, options.drop_side_walls, options.opening_radius);
+  } else {
+    SCAN_TRY(s, TakeBestLevel(volume, options, progress, stop));
+  }
   if (s.voxels == 0)
     return BadInput(fmt::format("no voxel reaches the threshold {:g}", s.threshold), "volume",
                     "give a lower --threshold");

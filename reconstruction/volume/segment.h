@@ -16,24 +16,29 @@ namespace scan {
 struct SegmentOptions {
   std::optional<double> threshold;       // grey value; empty: chosen among OtsuLevels
   std::optional<double> grow_threshold;  // below `threshold`: regions grow from the specimen to it
-  int otsu_levels = 8;
   bool drop_side_walls = true;  // what touches a side wall of the volume (tube, holder)
   int opening_radius = 1;       // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
   int closing_radius = 1;       // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
   bool fill_cavities = true;
 };
 
+// A candidate for the threshold, judged on the volume reduced to at most about two million voxels.
 struct LevelTried {
   double threshold = 0;
-  std::size_t above = 0;     // voxels from the threshold on
-  std::size_t largest = 0;   // voxels of the largest component away from the side walls
+  std::size_t above = 0;    // voxels from the threshold on
+  std::size_t wall = 0;     // of these at the side walls
+  std::size_t largest = 0;  // of these in the largest component of the rest
+  double inner = 0, outer = 0;  // mean grey a voxel inside and outside of that component's surface
+  double contrast = 0;          // (inner - outer) / (inner - darkest class)
+  bool plausible = false;
 };
 
 struct Segmentation {
   VoxelSet specimen;
   VoxelSet filled;  // of these the voxels of filled cavities and their closed leaks
   double threshold = 0;
-  std::vector<LevelTried> levels;  // in the order tried; one where the threshold was given
+  std::vector<LevelTried> levels;  // in ascending order; empty where the threshold was given
+  std::size_t voxels_above = 0;  // all from the threshold on
   std::size_t voxels = 0;
   std::size_t cavity_voxels = 0;
   std::size_t components = 0;             // above the threshold
@@ -47,11 +52,13 @@ struct Segmentation {
 // The specimen's voxels: threshold, side walls dropped, region growing from the largest component,
 // cavities filled.
 //
-// Without a given threshold the levels of OtsuLevels are tried from the lowest; the first is taken
-// at which the largest component away from the side walls holds at least a fifth of all voxels from
-// that level on. A specimen in air ends at the first level; one in fluid in a tube at the level
-// that takes the fluid away. When no level does (the specimen fills the volume) the first level is
-// taken and nothing is dropped.
+// Without a given threshold the candidates of OtsuLevels are judged: plausible is one whose largest
+// component away from the side walls outweighs the other such components (noise does not) and is a
+// twentieth of all that is above. Taken is the lowest plausible one whose contrast is at least
+// 0.45 of the best: the noise of air and the shading of a fluid have none, and a dense core does
+// not win over the softer hull around it. The
+// threshold is then the middle of that step. When none is plausible (the specimen fills the
+// volume) the first Otsu threshold is taken and nothing is dropped.
 // Opening: what survives it and touches a side wall claims the voxels nearer to it (along paths
 // inside) than to the rest, so that thin legs stay with the specimen and bridges are cut half-way.
 // Errors: bad_input for an empty volume, one single grey value, or nothing above the threshold.

@@ -31,17 +31,17 @@ double Quantile(const Histogram& h, double share, double total) {
   return h.low + h.width * kBins;
 }
 
-// The first bin of the upper class; `from` where the bins hold one class only. On a plateau of the
+// The first bin of the upper class of [from, end); `from` where they hold one class only. On a plateau of the
 // criterion (no voxels between the classes) its middle.
-std::size_t OtsuBin(const Histogram& h, std::size_t from) {
+std::size_t OtsuBin(const Histogram& h, std::size_t from, std::size_t end) {
   double total = 0, moment = 0;
-  for (std::size_t b = from; b < kBins; ++b) {
+  for (std::size_t b = from; b < end; ++b) {
     total += h.count[b];
     moment += h.count[b] * static_cast<double>(b);
   }
   double below = 0, below_moment = 0, best = 0;
   std::size_t first = from, last = from;
-  for (std::size_t b = from; b + 1 < kBins; ++b) {
+  for (std::size_t b = from; b + 1 < end; ++b) {
     below += h.count[b];
     below_moment += h.count[b] * static_cast<double>(b);
     const double above = total - below;
@@ -58,9 +58,18 @@ std::size_t OtsuBin(const Histogram& h, std::size_t from) {
   return first + (last - first) / 2;
 }
 
+void SplitRecursively(const Histogram& h, std::size_t from, std::size_t end, int depth,
+                      std::vector<std::size_t>& bins) {
+  const std::size_t bin = depth > 0 ? OtsuBin(h, from, end) : from;
+  if (bin == from) return;
+  bins.push_back(bin);
+  SplitRecursively(h, from, bin, depth - 1, bins);
+  SplitRecursively(h, bin, end, depth - 1, bins);
+}
+
 }  // namespace
 
-std::vector<double> OtsuLevels(const Volume& volume, int levels) {
+std::vector<double> OtsuLevels(const Volume& volume, int depth, int tail) {
   if (volume.grey.empty()) return {};
   const auto [low, high] = std::minmax_element(volume.grey.begin(), volume.grey.end());
   if (!(*high > *low)) return {};
@@ -68,14 +77,16 @@ std::vector<double> OtsuLevels(const Volume& volume, int levels) {
   Histogram h = Fill(volume, *low, *high);
   const double q_low = Quantile(h, 1e-4, total), q_high = Quantile(h, 1 - 1e-4, total) + h.width;
   if (q_high - q_low > 4 * h.width) h = Fill(volume, q_low, q_high);
-  std::vector<double> found;
-  std::size_t from = 0;
-  while (static_cast<int>(found.size()) < levels) {
-    const std::size_t bin = OtsuBin(h, from);
-    if (bin == from) break;
-    found.push_back(h.low + h.width * static_cast<double>(bin));
-    from = bin;
+  std::vector<std::size_t> bins;
+  SplitRecursively(h, 0, kBins, depth, bins);
+  std::sort(bins.begin(), bins.end());
+  for (int n = 0; n < tail && !bins.empty(); ++n) {
+    const std::size_t bin = OtsuBin(h, bins.back(), kBins);
+    if (bin == bins.back()) break;
+    bins.push_back(bin);
   }
+  std::vector<double> found;
+  for (const std::size_t bin : bins) found.push_back(h.low + h.width * static_cast<double>(bin));
   return found;
 }
 

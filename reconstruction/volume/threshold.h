@@ -7,13 +7,13 @@
 
 namespace scan {
 
-// Ascending candidates: Otsu's threshold of all voxels, then again of the voxels above it, and so
-// on, at most `levels`. Each step takes off the darkest class that is left (air, then fluid, then
-// tube ...), so that a specimen of 2 % of the voxels gets a threshold of its own, which the
-// simultaneous form of several levels spends on splitting the large classes.
-// Grey values; at least one candidate for a volume that holds two different values, else none.
+// Ascending candidates for a threshold: Otsu's of all voxels, then of the voxels on either side of
+// it, and so on, `depth` times on the whole and `tail` more times of the brightest class alone.
+// Unlike the simultaneous form this also finds a specimen of 2 % of the voxels, on which that form
+// spends no level because splitting the large classes (air, fluid) gains more.
+// Grey values; none for a volume of one single value.
 // Thread contract: pure. Source: Otsu 1979, applied recursively (Cheriet, Said, Suen 1998).
-std::vector<double> OtsuLevels(const Volume& volume, int levels);
+std::vector<double> OtsuLevels(const Volume& volume, int depth, int tail);
 
 // Mean grey of the voxels below (first) and from (second) the threshold.
 struct ClassMeans {
