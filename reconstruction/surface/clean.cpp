@@ -48,9 +48,8 @@ void RemoveFlagged(TriangleMesh& mesh, const std::vector<std::uint8_t>& remove) 
 }
 
 std::size_t RemoveDegenerate(TriangleMesh& mesh) {
-  return std::erase_if(mesh.faces, [](const Face& f) {
-    return f[0] == f[1] || f[1] == f[2] || f[2] == f[0];
-  });
+  return std::erase_if(mesh.faces,
+                       [](const Face& f) { return f[0] == f[1] || f[1] == f[2] || f[2] == f[0]; });
 }
 
 // Pairs of faces with the same corners and opposite orientation: a sheet without thickness.
@@ -119,8 +118,8 @@ void PairAboutEdge(const TriangleMesh& mesh, const std::vector<std::uint32_t>& f
 }
 
 struct Pairing {
-  std::vector<std::uint32_t> partner;                // half-edge -> half-edge, kNone at a boundary
-  std::vector<std::vector<std::uint32_t>> crowded;   // forward half-edges of edges with > 2 faces
+  std::vector<std::uint32_t> partner;               // half-edge -> half-edge, kNone at a boundary
+  std::vector<std::vector<std::uint32_t>> crowded;  // forward half-edges of edges with > 2 faces
 };
 
 Pairing PairHalfEdges(const TriangleMesh& mesh) {
@@ -265,12 +264,12 @@ std::size_t DropSmallComponents(TriangleMesh& mesh, double least_share) {
     const std::uint32_t root = sets.Find(f[0]);
     largest = std::max(largest, ++faces[root]);
     const Eigen::Vector3d& o = mesh.vertices[root];
-    volume[root] += (mesh.vertices[f[0]] - o)
-                        .dot((mesh.vertices[f[1]] - o).cross(mesh.vertices[f[2]] - o));
+    volume[root] +=
+        (mesh.vertices[f[0]] - o).dot((mesh.vertices[f[1]] - o).cross(mesh.vertices[f[2]] - o));
   }
   const auto dropped = [&](std::uint32_t root) {
-    return volume[root] < 0 || static_cast<double>(faces[root]) <
-                                   least_share * static_cast<double>(largest);
+    return volume[root] < 0 ||
+           static_cast<double>(faces[root]) < least_share * static_cast<double>(largest);
   };
   std::size_t count = 0;
   for (std::uint32_t v = 0; v < faces.size(); ++v) count += faces[v] > 0 && dropped(v);

@@ -8,11 +8,11 @@
 namespace scan {
 
 struct CleanReport {
-  std::size_t degenerate_faces = 0;   // removed: two corners the same
-  std::size_t cancelled_faces = 0;    // removed: pairs back to back with the same corners
-  std::size_t split_edges = 0;        // had more than two faces
-  std::size_t split_vertices = 0;     // had more than one fan of faces
-  std::size_t small_components = 0;   // removed
+  std::size_t degenerate_faces = 0;  // removed: two corners the same
+  std::size_t cancelled_faces = 0;   // removed: pairs back to back with the same corners
+  std::size_t split_edges = 0;       // had more than two faces
+  std::size_t split_vertices = 0;    // had more than one fan of faces
+  std::size_t small_components = 0;  // removed
 };
 
 // Removes degenerate faces and back-to-back pairs, splits edges with more than two faces and

@@ -72,9 +72,9 @@ Result<Decimation> Decimate(const TriangleMesh& mesh, const DecimateOptions& opt
   indices.reserve(simplified.size());
   for (const Face& f : mesh.faces) indices.insert(indices.end(), f.begin(), f.end());
   float error = 0;
-  const std::size_t kept = meshopt_simplify(
-      simplified.data(), indices.data(), indices.size(), positions.data(), mesh.vertices.size(),
-      3 * sizeof(float), options.faces * 3, 1.0f, 0, &error);
+  const std::size_t kept =
+      meshopt_simplify(simplified.data(), indices.data(), indices.size(), positions.data(),
+                       mesh.vertices.size(), 3 * sizeof(float), options.faces * 3, 1.0f, 0, &error);
   // `error` is relative to the largest extent, which is 1 here.
   out.quadric_error_mm = error * scale;
   out.mesh.vertices = mesh.vertices;
@@ -82,9 +82,9 @@ Result<Decimation> Decimate(const TriangleMesh& mesh, const DecimateOptions& opt
     out.mesh.faces.push_back({simplified[n], simplified[n + 1], simplified[n + 2]});
   MakeManifold(out.mesh);
   if (out.mesh.faces.empty() || !CheckTopology(out.mesh).closed_manifold())
-    return Failed(fmt::format("the mesh cannot be reduced to {} faces and stay closed",
-                              options.faces),
-                  "decimation", "ask for more --faces");
+    return Failed(
+        fmt::format("the mesh cannot be reduced to {} faces and stay closed", options.faces),
+        "decimation", "ask for more --faces");
   MeasureDeviation(mesh, out);
   return out;
 }

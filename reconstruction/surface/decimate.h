@@ -14,9 +14,9 @@ struct DecimateOptions {
 
 struct Decimation {
   TriangleMesh mesh;
-  double quadric_error_mm = 0;   // the simplifier's own estimate of its largest step
-  double max_deviation_mm = 0;   // from the original's vertices (a sample of up to 40,000 of them)
-  double rms_deviation_mm = 0;   // to the new surface, measured
+  double quadric_error_mm = 0;  // the simplifier's own estimate of its largest step
+  double max_deviation_mm = 0;  // from the original's vertices (a sample of up to 40,000 of them)
+  double rms_deviation_mm = 0;  // to the new surface, measured
 };
 
 // Quadric edge collapse to about `faces` faces, made a closed manifold again; a mesh with no more

@@ -3,8 +3,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <vtkCellArray.h>
-#include <vtkFlyingEdges3D.h>
 #include <vtkFloatArray.h>
+#include <vtkFlyingEdges3D.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
@@ -129,7 +129,9 @@ vtkNew<vtkImageData> MakeField(const Volume& volume, const Segmentation& s,
   image->SetOrigin(-1, -1, -1);
   image->AllocateScalars(VTK_FLOAT, 1);
   float* field = static_cast<float*>(image->GetScalarPointer());
-  const auto clamped = [](std::size_t p, std::size_t n) { return std::clamp<std::size_t>(p, 1, n) - 1; };
+  const auto clamped = [](std::size_t p, std::size_t n) {
+    return std::clamp<std::size_t>(p, 1, n) - 1;
+  };
   tbb::parallel_for(std::size_t{0}, d, [&](std::size_t k) {
     for (std::size_t j = 0; j < h; ++j)
       for (std::size_t i = 0; i < w; ++i) {

@@ -16,16 +16,15 @@ struct IsosurfaceOptions {
 
 // Closed surface of the segmented specimen in the model frame, mm; faces outward.
 //
-// Flying edges at the zero of F = grey - T. T(v) = (air(v) + material(v)) / 2, the half-way value at
-// which a blurred step edge has its true place; material(v) is the mean over the window of specimen
-// voxels that do not touch the outside, air(v) of outside voxels that do not touch material. Where
-// the window holds no such voxel (blades and legs of two voxels) the segmentation's threshold
-// stands. Voxels farther than one from the specimen's own, and those of dropped components, are
-// air; filled cavities and voxels deeper than two are material. One layer of air around the volume
-// closes the surface there half a voxel beyond the last centre.
-// Precondition: the segmentation is of this volume.
-// Thread contract: pure; parallel inside, same bytes for any number of threads.
-// Source: Schroeder, Maynard, Geveci 2015 (flying edges).
+// Flying edges at the zero of F = grey - T. T(v) = (air(v) + material(v)) / 2, the half-way value
+// at which a blurred step edge has its true place; material(v) is the mean over the window of
+// specimen voxels that do not touch the outside, air(v) of outside voxels that do not touch
+// material. Where the window holds no such voxel (blades and legs of two voxels) the segmentation's
+// threshold stands. Voxels farther than one from the specimen's own, and those of dropped
+// components, are air; filled cavities and voxels deeper than two are material. One layer of air
+// around the volume closes the surface there half a voxel beyond the last centre. Precondition: the
+// segmentation is of this volume. Thread contract: pure; parallel inside, same bytes for any number
+// of threads. Source: Schroeder, Maynard, Geveci 2015 (flying edges).
 TriangleMesh Isosurface(const Volume& volume, const Segmentation& segmentation,
                         const IsosurfaceOptions& options = {});
 

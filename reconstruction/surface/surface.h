@@ -17,9 +17,9 @@ namespace scan {
 struct SurfaceOptions {
   SegmentOptions segment;
   IsosurfaceOptions isosurface;
-  int smoothing_iterations = 10;          // 0: none
-  double smoothing_limit_voxels = 0.5;    // of the smallest voxel edge
-  double least_component_share = 0.001;   // of the largest component's faces
+  int smoothing_iterations = 10;         // 0: none
+  double smoothing_limit_voxels = 0.5;   // of the smallest voxel edge
+  double least_component_share = 0.001;  // of the largest component's faces
   DecimateOptions decimate;
 };
 

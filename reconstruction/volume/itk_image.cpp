@@ -27,11 +27,16 @@ using Image2 = itk::Image<float, 2>;
 
 itk::ImageIOBase::Pointer MakeIo(VolumeFormat format) {
   switch (format) {
-    case VolumeFormat::metaimage: return itk::MetaImageIO::New().GetPointer();
-    case VolumeFormat::nrrd: return itk::NrrdImageIO::New().GetPointer();
-    case VolumeFormat::nifti: return itk::NiftiImageIO::New().GetPointer();
-    case VolumeFormat::tiff: return itk::TIFFImageIO::New().GetPointer();
-    case VolumeFormat::png: return itk::PNGImageIO::New().GetPointer();
+    case VolumeFormat::metaimage:
+      return itk::MetaImageIO::New().GetPointer();
+    case VolumeFormat::nrrd:
+      return itk::NrrdImageIO::New().GetPointer();
+    case VolumeFormat::nifti:
+      return itk::NiftiImageIO::New().GetPointer();
+    case VolumeFormat::tiff:
+      return itk::TIFFImageIO::New().GetPointer();
+    case VolumeFormat::png:
+      return itk::PNGImageIO::New().GetPointer();
   }
   return {};
 }
@@ -110,7 +115,8 @@ HeaderFacts ReadHeaderFacts(const fs::path& path, VolumeFormat format) {
               has("encoding: raw") && !has("data file:") && !has("datafile:")};
     case VolumeFormat::nifti:
       return {true, path.extension() == ".nii"};
-    default: return {};
+    default:
+      return {};
   }
 }
 
@@ -176,8 +182,9 @@ Result<FileVolume> ReadSlices(const std::vector<fs::path>& slices, VolumeFormat 
       const std::size_t w = io->GetDimensions(0), h = io->GetDimensions(1);
       if (k == 0) {
         volume.size = {w, h, slices.size()};
-        SCAN_CHECK(CheckMemory(static_cast<double>(w) * static_cast<double>(h) *
-                                   static_cast<double>(slices.size()), path));
+        SCAN_CHECK(CheckMemory(
+            static_cast<double>(w) * static_cast<double>(h) * static_cast<double>(slices.size()),
+            path));
         volume.grey.resize(volume.voxels());
       }
       if (w != volume.size[0] || h != volume.size[1] ||
@@ -216,7 +223,8 @@ Result<FileVolume> ReadDicomSeries(const fs::path& folder) {
     SCAN_CHECK(CheckGrey(*io, files.front()));
     SCAN_CHECK(CheckMemory(static_cast<double>(io->GetDimensions(0)) *
                                static_cast<double>(io->GetDimensions(1)) *
-                               static_cast<double>(files.size()), folder));
+                               static_cast<double>(files.size()),
+                           folder));
     std::string value;
     const bool has_spacing =
         itk::ExposeMetaData<std::string>(io->GetMetaDataDictionary(), "0028|0030", value) ||
@@ -229,8 +237,9 @@ Result<FileVolume> ReadDicomSeries(const fs::path& folder) {
     itk::ExposeMetaData<double>(reader->GetOutput()->GetMetaDataDictionary(),
                                 "ITK_non_uniform_sampling_deviation", deviation);
     if (deviation > 0.01 * reader->GetOutput()->GetSpacing()[2])
-      return BadInput(fmt::format("slices are missing or unevenly spaced (by {:.3g} mm)", deviation),
-                      folder.string(), "export the whole series again");
+      return BadInput(
+          fmt::format("slices are missing or unevenly spaced (by {:.3g} mm)", deviation),
+          folder.string(), "export the whole series again");
     return FileVolume{CopyOut(*reader->GetOutput()), has_spacing};
   });
 }

@@ -102,10 +102,10 @@ Status CheckGreyValues(const Volume& volume, const fs::path& path) {
                     path.string(), "a volume needs at least 2 voxels along every axis");
   for (std::size_t v = 0; v < volume.grey.size(); ++v)
     if (!std::isfinite(volume.grey[v]))
-      return BadInput(fmt::format("NaN or infinite grey value at voxel ({}, {}, {})",
-                                  v % volume.size[0], v / volume.size[0] % volume.size[1],
-                                  v / (volume.size[0] * volume.size[1])),
-                      path.string(), "replace it by the grey value of air");
+      return BadInput(
+          fmt::format("NaN or infinite grey value at voxel ({}, {}, {})", v % volume.size[0],
+                      v / volume.size[0] % volume.size[1], v / (volume.size[0] * volume.size[1])),
+          path.string(), "replace it by the grey value of air");
   return {};
 }
 

@@ -104,8 +104,9 @@ VoxelSet SideWallPart(const VoxelSet& above, const Labelling& labelling, int ope
 std::ptrdiff_t LargestOf(const Labelling& labelling) {
   const auto& all = labelling.components;
   if (all.empty()) return -1;
-  return std::max_element(all.begin(), all.end(),
-                          [](const Component& a, const Component& b) { return a.voxels < b.voxels; }) -
+  return std::max_element(
+             all.begin(), all.end(),
+             [](const Component& a, const Component& b) { return a.voxels < b.voxels; }) -
          all.begin();
 }
 
@@ -150,9 +151,8 @@ void Grow(const Volume& volume, double grow_threshold, Segmentation& s) {
 
 // Cavities of the closed set, and of the voxels that the closing added those that seal them.
 void FillCavities(int closing_radius, Segmentation& s) {
-  const VoxelSet closed = closing_radius > 0
-                              ? Eroded(Dilated(s.specimen, closing_radius), closing_radius)
-                              : s.specimen;
+  const VoxelSet closed =
+      closing_radius > 0 ? Eroded(Dilated(s.specimen, closing_radius), closing_radius) : s.specimen;
   const VoxelSet cavities = EnclosedCavities(closed);
   const VoxelSet near = Dilated(cavities, closing_radius + 1);
   s.filled = cavities;
@@ -163,7 +163,8 @@ void FillCavities(int closing_radius, Segmentation& s) {
   s.cavity_voxels = Count(s.filled);
 }
 
-// Means over cubes of `factor` voxels a side; what does not fill a cube at the far ends is left out.
+// Means over cubes of `factor` voxels a side; what does not fill a cube at the far ends is left
+// out.
 Volume Reduced(const Volume& volume, std::size_t factor) {
   Volume out;
   for (int a = 0; a < 3; ++a) out.size[a] = std::max<std::size_t>(1, volume.size[a] / factor);
@@ -226,22 +227,24 @@ LevelTried Judge(const Volume& volume, double threshold, double darkest,
   return level;
 }
 
-Result<std::vector<LevelTried>> JudgeLevels(const Volume& volume, const SegmentOptions& options,
-                                            const ProgressFn& progress,
-                                            const std::stop_token& stop) {
-  std::size_t factor = 1;
-  while (volume.voxels() / (factor * factor * factor) > kVoxelsToJudge) ++factor;
-  const Volume reduced = factor > 1 ? Reduced(volume, factor) : volume;
+struct Candidates {
+  Volume reduced;
+  double darkest = 0;
   std::vector<LevelTried> tried;
-  const std::vector<double> levels = OtsuLevels(volume, 3, 2);
-  const double darkest = levels.empty() ? 0 : MeansAbout(volume, levels.front()).below;
+};
+
+// All levels, at the given opening. The noise of air at its own median runs through the whole
+// volume and reaches the walls; an opening would cut it into something that looks like a body.
+Status JudgeLevels(const std::vector<double>& levels, const SegmentOptions& options,
+                   const ProgressFn& progress, const std::stop_token& stop, Candidates& c) {
+  c.tried.clear();
   for (const double level : levels) {
     if (stop.stop_requested()) return Cancelled("segmentation");
     Report(progress, "segment",
-           0.6 * static_cast<double>(tried.size()) / static_cast<double>(levels.size()));
-    tried.push_back(Judge(reduced, level, darkest, options));
+           0.6 * static_cast<double>(c.tried.size()) / static_cast<double>(levels.size()));
+    c.tried.push_back(Judge(c.reduced, level, c.darkest, options));
   }
-  return tried;
+  return {};
 }
 
 const LevelTried* BestLevel(const std::vector<LevelTried>& tried) {
@@ -253,22 +256,44 @@ const LevelTried* BestLevel(const std::vector<LevelTried>& tried) {
   return nullptr;
 }
 
+// The middle of the step at the component's surface, found again at the threshold it gives.
+double MiddleOfStep(const Candidates& c, LevelTried level, const SegmentOptions& options) {
+  for (int n = 0; n < 2; ++n) {
+    const LevelTried next = Judge(c.reduced, 0.5 * (level.inner + level.outer), c.darkest, options);
+    if (!next.plausible) break;
+    level = next;
+  }
+  return 0.5 * (level.inner + level.outer);
+}
+
 Result<Segmentation> TakeBestLevel(const Volume& volume, const SegmentOptions& options,
                                    const ProgressFn& progress, const std::stop_token& stop) {
-  SCAN_TRY(std::vector<LevelTried> tried, JudgeLevels(volume, options, progress, stop));
-  if (tried.empty())
+  const std::vector<double> levels = OtsuLevels(volume, 3, 2);
+  if (levels.empty())
     return BadInput("all voxels have the same grey value", "volume",
                     "check that the file holds the scan of a specimen");
+  std::size_t factor = 1;
+  while (volume.voxels() / (factor * factor * factor) > kVoxelsToJudge) ++factor;
+  Candidates c{
+      factor > 1 ? Reduced(volume, factor) : volume, MeansAbout(volume, levels.front()).below, {}};
+  SegmentOptions judged = options;
+  judged.opening_radius = 0;
+  SCAN_CHECK(JudgeLevels(levels, judged, progress, stop, c));
+  if (!BestLevel(c.tried) && options.opening_radius > 0) {
+    judged.opening_radius = options.opening_radius;
+    SCAN_CHECK(JudgeLevels(levels, judged, progress, stop, c));
+  }
   Segmentation s;
-  if (const LevelTried* best = BestLevel(tried)) {
-    s = TakeLargest(volume, 0.5 * (best->inner + best->outer), options.drop_side_walls,
+  if (const LevelTried* best = BestLevel(c.tried)) {
+    s = TakeLargest(volume, MiddleOfStep(c, *best, judged), options.drop_side_walls,
                     options.opening_radius);
   } else {
     s = TakeLargest(volume, OtsuLevels(volume, 1, 0).front(), false, 0);
     s.notes.push_back(
-        "no threshold separates a specimen from the side walls: the largest component is kept whole");
+        "no threshold separates a specimen from the side walls: the largest component is kept "
+        "whole");
   }
-  s.levels = std::move(tried);
+  s.levels = std::move(c.tried);
   return s;
 }
 

@@ -16,18 +16,18 @@ namespace scan {
 struct SegmentOptions {
   std::optional<double> threshold;       // grey value; empty: chosen among OtsuLevels
   std::optional<double> grow_threshold;  // below `threshold`: regions grow from the specimen to it
-  bool drop_side_walls = true;  // what touches a side wall of the volume (tube, holder)
-  int opening_radius = 1;       // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
-  int closing_radius = 1;       // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
+  bool drop_side_walls = true;           // what touches a side wall of the volume (tube, holder)
+  int opening_radius = 1;  // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
+  int closing_radius = 1;  // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
   bool fill_cavities = true;
 };
 
 // A candidate for the threshold, judged on the volume reduced to at most about two million voxels.
 struct LevelTried {
   double threshold = 0;
-  std::size_t above = 0;    // voxels from the threshold on
-  std::size_t wall = 0;     // of these at the side walls
-  std::size_t largest = 0;  // of these in the largest component of the rest
+  std::size_t above = 0;        // voxels from the threshold on
+  std::size_t wall = 0;         // of these at the side walls
+  std::size_t largest = 0;      // of these in the largest component of the rest
   double inner = 0, outer = 0;  // mean grey a voxel inside and outside of that component's surface
   double contrast = 0;          // (inner - outer) / (inner - darkest class)
   bool plausible = false;
@@ -38,13 +38,13 @@ struct Segmentation {
   VoxelSet filled;  // of these the voxels of filled cavities and their closed leaks
   double threshold = 0;
   std::vector<LevelTried> levels;  // in ascending order; empty where the threshold was given
-  std::size_t voxels_above = 0;  // all from the threshold on
+  std::size_t voxels_above = 0;    // all from the threshold on
   std::size_t voxels = 0;
   std::size_t cavity_voxels = 0;
-  std::size_t components = 0;             // above the threshold
-  std::size_t side_wall_components = 0;   // dropped
-  std::size_t side_wall_voxels = 0;       // dropped
-  std::size_t small_components = 0;       // dropped: neither largest nor at a side wall
+  std::size_t components = 0;            // above the threshold
+  std::size_t side_wall_components = 0;  // dropped
+  std::size_t side_wall_voxels = 0;      // dropped
+  std::size_t small_components = 0;      // dropped: neither largest nor at a side wall
   std::size_t small_voxels = 0;
   std::vector<std::string> notes;  // sentences for the report
 };

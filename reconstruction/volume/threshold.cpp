@@ -31,8 +31,8 @@ double Quantile(const Histogram& h, double share, double total) {
   return h.low + h.width * kBins;
 }
 
-// The first bin of the upper class of [from, end); `from` where they hold one class only. On a plateau of the
-// criterion (no voxels between the classes) its middle.
+// The first bin of the upper class of [from, end); `from` where they hold one class only. On a
+// plateau of the criterion (no voxels between the classes) its middle.
 std::size_t OtsuBin(const Histogram& h, std::size_t from, std::size_t end) {
   double total = 0, moment = 0;
   for (std::size_t b = from; b < end; ++b) {
@@ -97,7 +97,8 @@ ClassMeans MeansAbout(const Volume& volume, double threshold) {
     sum[side] += g;
     count[side] += 1;
   }
-  return {count[0] > 0 ? sum[0] / count[0] : threshold, count[1] > 0 ? sum[1] / count[1] : threshold};
+  return {count[0] > 0 ? sum[0] / count[0] : threshold,
+          count[1] > 0 ? sum[1] / count[1] : threshold};
 }
 
 }  // namespace scan

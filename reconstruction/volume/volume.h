@@ -8,8 +8,8 @@
 
 namespace scan {
 
-// Voxel (i, j, k) has its centre at origin_mm + direction * (spacing_mm o (i, j, k)); i runs fastest
-// in `grey`. Signed and unsigned integers and floats of a file are all held as float.
+// Voxel (i, j, k) has its centre at origin_mm + direction * (spacing_mm o (i, j, k)); i runs
+// fastest in `grey`. Signed and unsigned integers and floats of a file are all held as float.
 struct Volume {
   std::array<std::size_t, 3> size{0, 0, 0};
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();

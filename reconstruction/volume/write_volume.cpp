@@ -71,9 +71,15 @@ Status WriteVolume(const fs::path& path, const Volume& volume, const WriteVolume
   std::error_code code;
   try {
     switch (options.type) {
-      case GreyType::uint8: Write<std::uint8_t>(beside, volume, options.compressed, io); break;
-      case GreyType::uint16: Write<std::uint16_t>(beside, volume, options.compressed, io); break;
-      case GreyType::float32: Write<float>(beside, volume, options.compressed, io); break;
+      case GreyType::uint8:
+        Write<std::uint8_t>(beside, volume, options.compressed, io);
+        break;
+      case GreyType::uint16:
+        Write<std::uint16_t>(beside, volume, options.compressed, io);
+        break;
+      case GreyType::float32:
+        Write<float>(beside, volume, options.compressed, io);
+        break;
     }
     fs::rename(beside, path);
   } catch (const std::exception& e) {

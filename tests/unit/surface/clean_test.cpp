@@ -15,7 +15,8 @@ void AddTetrahedron(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, std::u
 
 TEST(MakeManifold, SplitsAVertexOfTwoFans) {
   TriangleMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {1, 0, 1}, {0, 1, 1}, {-1, -1, 1}, {1, 0, -1}, {0, 1, -1}, {-1, -1, -1}};
+  mesh.vertices = {{0, 0, 0},  {1, 0, 1},  {0, 1, 1},   {-1, -1, 1},
+                   {1, 0, -1}, {0, 1, -1}, {-1, -1, -1}};
   AddTetrahedron(mesh, 1, 2, 3, 0);
   AddTetrahedron(mesh, 6, 5, 4, 0);
   ASSERT_EQ(CheckTopology(mesh).non_manifold_vertices, 1u);
@@ -66,10 +67,12 @@ TEST(MakeManifold, SeparatesTwoSheetsThatShareAnEdgeOfOneFan) {
 
 TEST(DropSmallComponents, KeepsTheLargeOnesAndDropsInwardOnes) {
   TriangleMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {5, 0, 0}, {6, 0, 0}, {5, 1, 0}, {5, 0, -1}};
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1},
+                   {5, 0, 0}, {6, 0, 0}, {5, 1, 0}, {5, 0, -1}};
   AddTetrahedron(mesh, 0, 1, 2, 3);
   AddTetrahedron(mesh, 4, 6, 5, 7);
-  ASSERT_GT(SignedVolume(TriangleMesh{mesh.vertices, {mesh.faces.begin(), mesh.faces.begin() + 4}}), 0);
+  ASSERT_GT(SignedVolume(TriangleMesh{mesh.vertices, {mesh.faces.begin(), mesh.faces.begin() + 4}}),
+            0);
   EXPECT_EQ(DropSmallComponents(mesh, 0.0), 1u);
   EXPECT_EQ(mesh.faces.size(), 4u);
   EXPECT_GT(SignedVolume(mesh), 0);
