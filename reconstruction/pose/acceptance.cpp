@@ -2,9 +2,27 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace scan {
+
+namespace {
+
+// Every piece of the model's contour where the photograph would show it, each a little longer than
+// it is, so that neighbours overlap.
+ContourGrid ModelGrid(const ContourMesh& mesh, const ViewState& state) {
+  std::vector<GridSegment> pieces;
+  for (const ContourSample& s :
+       FindContourSamples(mesh, state.camera_from_model, state.intrinsics, 1.0)) {
+    const Eigen::Vector2d middle = s.pixel + state.mask_bias_px * s.normal;
+    const Eigen::Vector2d half = s.half + 1.0 * s.half.normalized();
+    pieces.push_back({middle - half, middle + half, s.normal, 0});
+  }
+  return ContourGrid(std::move(pieces), state.intrinsics.w, state.intrinsics.h);
+}
+
+}  // namespace
 
 Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
                           const ViewState& state, double tolerance_px, double spacing_px) {
@@ -25,21 +43,34 @@ Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
   explained.model_share = model_px > 0 ? near_px / model_px : 0;
   explained.rms_px = near_px > 0 ? std::sqrt(squares / near_px) : 0;
 
-  // The other way: pieces of the model's contour, each a little longer than it is so that
-  // neighbours overlap, and every one of them.
-  std::vector<GridSegment> pieces;
-  for (const ContourSample& s :
-       FindContourSamples(mesh, state.camera_from_model, state.intrinsics, 1.0)) {
-    const Eigen::Vector2d middle = s.pixel + state.mask_bias_px * s.normal;
-    const Eigen::Vector2d half = s.half + 1.0 * s.half.normalized();
-    pieces.push_back({middle - half, middle + half, s.normal, 0});
-  }
-  const ContourGrid grid(std::move(pieces), state.intrinsics.w, state.intrinsics.h);
+  const ContourGrid grid = ModelGrid(mesh, state);
   std::size_t found = 0;
   for (const ContourPoint& p : photo.points)
     found += grid.Nearest(p.position, p.normal, tolerance_px, 0.5).has_value();
   explained.photo_share = static_cast<double>(found) / static_cast<double>(photo.points.size());
   return explained;
+}
+
+double TwoWayDistance(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+                      double clip_px, double spacing_px) {
+  const auto samples =
+      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, spacing_px);
+  if (samples.empty() || photo.empty()) return clip_px;
+  const MatchResult match = MatchContour(samples, photo, state.mask_bias_px, clip_px);
+  double model = clip_px * match.unmatched_px;
+  for (const ContourMatch& m : match.matches) model += m.length_px * std::abs(m.residual_px);
+  const double length = match.unmatched_px + match.MatchedLength();
+  const ContourGrid grid = ModelGrid(mesh, state);
+  const std::size_t stride =
+      std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(spacing_px / 2)));
+  double back = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < photo.points.size(); i += stride, ++count) {
+    const ContourPoint& p = photo.points[i];
+    const auto crossing = grid.Nearest(p.position, p.normal, clip_px, 0.5);
+    back += crossing ? std::abs(crossing->distance_px) : clip_px;
+  }
+  return 0.5 * (length > 0 ? model / length : clip_px) + 0.5 * back / static_cast<double>(count);
 }
 
 std::string RejectionReason(const Explained& explained, double view_prior_chi2,

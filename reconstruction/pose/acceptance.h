@@ -24,6 +24,12 @@ struct Explained {
 Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
                           const ViewState& state, double tolerance_px, double spacing_px);
 
+// Mean distance between the two contours along their normals, each piece's clipped at `clip_px`,
+// half from the model to the photo and half from the photo to the model: what tells candidates
+// apart, whatever they leave unexplained. `clip_px` when either contour is empty.
+double TwoWayDistance(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+                      double clip_px, double spacing_px);
+
 // Empty when accepted, else the reason in one sentence.
 std::string RejectionReason(const Explained& explained, double view_prior_chi2,
                             const AcceptanceOptions& options);

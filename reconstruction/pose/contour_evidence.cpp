@@ -95,7 +95,8 @@ MatchResult MatchContour(std::span<const ContourSample> samples, const PhotoCont
     }
     if (photo.grid.segments()[crossing->segment].flags != 0) continue;
     result.matches.push_back({sample.point, from + crossing->distance_px * sample.normal,
-                              sample.normal, crossing->distance_px, sample.length_px});
+                              sample.normal, crossing->distance_px, sample.length_px,
+                              sample.vertices});
   }
   return result;
 }
@@ -110,21 +111,25 @@ double RobustSigma(std::span<const ContourMatch> matches) {
   return 1.4826 * *middle;
 }
 
+double WeightOf(const ContourMatch& match, double residual_px, const EvidenceWeights& weights) {
+  return std::min(1.0, match.length_px / weights.correlation_px) *
+         TukeyWeight(residual_px, weights.tukey_sigmas * weights.sigma_px) /
+         (weights.sigma_px * weights.sigma_px);
+}
+
 CondensedEvidence Condense(const ViewState& state, std::span<const ContourMatch> matches,
                            const Eigen::Vector3d& pivot, const EvidenceWeights& weights) {
   CondensedEvidence evidence;
   evidence.state = state;
   evidence.pivot = pivot;
-  const double information = 1.0 / (weights.sigma_px * weights.sigma_px);
   for (const ContourMatch& match : matches) {
     EvidenceVector dr;
     const double r = ContourResidual(state, match.point, match.target, match.normal, pivot, &dr);
-    const double count = std::min(1.0, match.length_px / weights.correlation_px) *
-                         TukeyWeight(r, weights.tukey_sigmas * weights.sigma_px);
-    if (count <= 0) continue;
-    evidence.H.selfadjointView<Eigen::Lower>().rankUpdate(dr, count * information);
-    evidence.g += (count * information * r) * dr;
-    evidence.weight += count;
+    const double weight = WeightOf(match, r, weights);
+    if (weight <= 0) continue;
+    evidence.H.selfadjointView<Eigen::Lower>().rankUpdate(dr, weight);
+    evidence.g += (weight * r) * dr;
+    evidence.weight += weight * weights.sigma_px * weights.sigma_px;
   }
   evidence.H.triangularView<Eigen::StrictlyUpper>() = evidence.H.transpose();
   return evidence;

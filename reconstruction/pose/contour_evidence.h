@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -58,6 +60,7 @@ struct ContourMatch {
   Eigen::Vector2d normal;
   double residual_px = 0;  // bias taken off
   double length_px = 0;
+  std::array<std::uint32_t, 2> vertices{};  // of the mesh edge the point lies on
 };
 
 struct MatchResult {
@@ -80,6 +83,9 @@ struct EvidenceWeights {
   double correlation_px = 30;   // of contour that counts as one independent observation
   double tukey_sigmas = 4.685;  // beyond this a match counts nothing
 };
+
+// Independent observations that a match of this residual stands for, over sigma^2.
+double WeightOf(const ContourMatch& match, double residual_px, const EvidenceWeights& weights);
 
 // 1/2 y' H y + g' y + constant of y = (motion, log focal, principal point, bias) - (0, state).
 struct CondensedEvidence {

@@ -120,7 +120,7 @@ std::vector<ContourSample> FindContourSamples(const ContourMesh& contour_mesh,
       const auto pixel = Project(intrinsics, camera_from_model * point);
       if (!pixel) continue;
       samples.push_back({point, *pixel, normal, 0.5 / pieces * (b - a),
-                         length / pieces + (k == 0 ? skipped_px : 0)});
+                         length / pieces + (k == 0 ? skipped_px : 0), edge.vertices});
     }
     skipped_px = 0;
   }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "drivers/base/frames.h"
@@ -29,6 +31,7 @@ struct ContourSample {
   Eigen::Vector2d normal;  // of the contour in the picture, unit length, towards the background
   Eigen::Vector2d half;    // half of the projected piece, which is pixel +- half
   double length_px = 0;    // of contour that the sample stands for
+  std::array<std::uint32_t, 2> vertices{};  // of the mesh edge it lies on
 };
 
 // The visible contour generators that border on the background (outer ones and those around holes

@@ -46,18 +46,26 @@ ReducedPicture ReducePicture(const Mask& mask, const Intrinsics& intrinsics, int
   return picture;
 }
 
-PictureCost CostOfPose(const ReducedPicture& picture, const TriangleMesh& mesh,
-                       const CameraFromModel& camera_from_model) {
+cv::Mat RenderReduced(const TriangleMesh& mesh, const CameraFromModel& camera_from_model,
+                      const Intrinsics& reduced) {
   const float nowhere = std::numeric_limits<float>::quiet_NaN();
+  const Eigen::Matrix3d rotation = camera_from_model.rotation();
+  const Eigen::Vector3d translation = camera_from_model.translation();
   std::vector<Eigen::Vector2f> pixels;
   pixels.reserve(mesh.vertices.size());
   for (const Eigen::Vector3d& v : mesh.vertices) {
-    const auto pixel = Project(picture.intrinsics, camera_from_model * v);
+    const auto pixel = Project(reduced, rotation * v + translation);
     pixels.push_back(pixel ? Eigen::Vector2f(pixel->cast<float>())
                            : Eigen::Vector2f(nowhere, nowhere));
   }
-  cv::Mat rendered(picture.mask.size(), CV_8U, cv::Scalar(0));
+  cv::Mat rendered(reduced.h, reduced.w, CV_8U, cv::Scalar(0));
   FillTriangles(pixels, mesh.faces, rendered);
+  return rendered;
+}
+
+PictureCost CostOfPose(const ReducedPicture& picture, const TriangleMesh& mesh,
+                       const CameraFromModel& camera_from_model) {
+  const cv::Mat rendered = RenderReduced(mesh, camera_from_model, picture.intrinsics);
   PictureCost cost;
   const std::vector<cv::Point> boundary = BoundaryPixels(rendered);
   if (boundary.empty()) {

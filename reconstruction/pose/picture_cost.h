@@ -29,6 +29,10 @@ ReducedPicture ReducePicture(const Mask& mask, const Intrinsics& intrinsics,
 // Foreground pixels with a 4-neighbour in the background; the picture's border is no background.
 std::vector<cv::Point> BoundaryPixels(const cv::Mat& mask);
 
+// What a reduced camera sees of the mesh: CV_8U, 0 or 255.
+cv::Mat RenderReduced(const TriangleMesh& mesh, const CameraFromModel& camera_from_model,
+                      const Intrinsics& reduced);
+
 struct PictureCost {
   double l1_px = 0, l2_px = 0;
 };

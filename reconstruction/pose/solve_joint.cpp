@@ -5,7 +5,9 @@
 
 #include <algorithm>
 
+#include "reconstruction/pose/choose_start.h"
 #include "reconstruction/pose/joint_result.h"
+#include "reconstruction/pose/observability.h"
 #include "reconstruction/pose/picture_cost.h"
 #include "reconstruction/pose/pose_input.h"
 
@@ -90,13 +92,11 @@ std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
   return judgements;
 }
 
-Poses Describe(const TriangleMesh& mesh, const ContourMesh& contour_mesh, const PhotoSet& photos,
-               std::span<const Mask> masks, const RigModel& rig, const RefineResult& fit,
-               std::span<const Judgement> judgements, const JointOptions& options) {
+Poses Describe(const ContourMesh& mesh, const PhotoSet& photos, std::span<const Mask> masks,
+               const RigModel& rig, const RefineResult& fit, const RigPosterior& posterior,
+               std::span<const Judgement> judgements) {
   Poses poses;
   poses.method = "joint";
-  poses.model = options.model;
-  const RigPosterior posterior = PosteriorOf(rig, fit);
   DescribeShared(photos, rig, posterior, fit.parameters, poses);
   poses.views.resize(photos.photos.size());
   tbb::parallel_for(std::size_t{0}, photos.photos.size(), [&](std::size_t i) {
@@ -118,15 +118,33 @@ Poses Describe(const TriangleMesh& mesh, const ContourMesh& contour_mesh, const 
     const Intrinsics intrinsics = rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens);
     const EvidenceMatrix covariance = ViewCovariance(rig, posterior, fit.parameters, index);
     view.covariance = covariance.topLeftCorner<6, 6>();
-    view.surface_sigma_px =
-        SurfaceSigmaOf(contour_mesh, view.camera_from_model, intrinsics, covariance);
+    view.surface_sigma_px = SurfaceSigmaOf(mesh, view.camera_from_model, intrinsics, covariance);
     const ReducedPicture picture = ReducePicture(masks[i], intrinsics);
     if (picture.empty()) return;
-    const PictureCost cost = CostOfPose(picture, mesh, view.camera_from_model);
+    const PictureCost cost = CostOfPose(picture, mesh.mesh, view.camera_from_model);
     view.cost_px = cost.l2_px;
     view.cost_l1_px = cost.l1_px;
   });
   return poses;
+}
+
+// What the accepted views of each mounting leave free.
+std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigModel& rig,
+                                          const RefineResult& fit,
+                                          std::span<const Judgement> judgements,
+                                          const ObservabilityOptions& options) {
+  const SmoothNormals smooth = SmoothNormalsOf(mesh, options.smoothing);
+  std::vector<FreeDirection> free;
+  for (int m = 0; m < static_cast<int>(rig.mounting_ids().size()); ++m) {
+    std::vector<int> views;
+    for (int i = 0; i < static_cast<int>(judgements.size()); ++i) {
+      if (rig.views()[i].mounting == m && judgements[i].reason.empty() && fit.fits[i].evidence)
+        views.push_back(i);
+    }
+    const auto found = FreeDirectionsOf(mesh, smooth, rig, fit, views, options);
+    free.insert(free.end(), found.begin(), found.end());
+  }
+  return free;
 }
 
 }  // namespace
@@ -145,12 +163,16 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
                     "log turntable and lift or give transform_matrix, and check the masks");
 
   const ContourMesh contour_mesh(mesh);
-  for (std::size_t m = 0; m < rig.mounting_ids().size(); ++m) {
-    const auto known = options.table_from_model.find(rig.mounting_ids()[m]);
-    if (known != options.table_from_model.end()) rig.set_start(static_cast<int>(m), known->second);
+  std::vector<bool> known(rig.mounting_ids().size(), false);
+  for (std::size_t m = 0; m < known.size(); ++m) {
+    const auto placing = options.table_from_model.find(rig.mounting_ids()[m]);
+    known[m] = placing != options.table_from_model.end();
+    if (known[m]) rig.set_start(static_cast<int>(m), placing->second);
   }
   const double scale = ScaleOf(photos);
   const RefineOptions refine = ScaledTo(options.refine, photos.intrinsics(photos.photos.front()).w);
+  Report(progress, "poses: search", 0.0);
+  SCAN_CHECK(ChooseStarts(contour_mesh, rig, contours, use, known, options.start, refine, stop));
   Report(progress, "poses: refine", 0.5);
   RefineResult fit = RefineJoint(contour_mesh, rig, contours, use, rig.Nominal(), refine, stop);
   auto judgements = Judge(contour_mesh, rig, contours, fit, use, options, scale, refine.spacing_px);
@@ -166,7 +188,16 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
   }
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
-  return Describe(mesh, contour_mesh, photos, masks, rig, fit, judgements, options);
+  ObservabilityOptions observability;
+  observability.weights.correlation_px = refine.correlation_px;
+  RigPosterior posterior = PosteriorOf(rig, fit);
+  const auto free = FreeDirections(contour_mesh, rig, fit, judgements, observability);
+  for (const FreeDirection& direction : free) AddFreedom(rig, fit.parameters, direction, posterior);
+  Poses poses = Describe(contour_mesh, photos, masks, rig, fit, posterior, judgements);
+  poses.model = options.model;
+  poses.free_directions = free;
+  for (const FreeDirection& direction : free) poses.notes.push_back(Sentence(direction));
+  return poses;
 }
 
 }  // namespace scan

@@ -16,6 +16,7 @@
 #include "reconstruction/pose/joint_refine.h"
 #include "reconstruction/pose/poses.h"
 #include "reconstruction/pose/rig_model.h"
+#include "reconstruction/pose/start_search.h"
 
 namespace scan {
 
@@ -24,6 +25,7 @@ struct JointOptions {
   RigPriors rig;
   RefineOptions refine;  // px of a picture 1848 px wide; scaled to the photos
   AcceptanceOptions acceptance;
+  StartOptions start;
   // Known placings by mounting id; the start search runs for the others.
   std::map<std::string, TableFromModel> table_from_model;
 };

@@ -1,0 +1,116 @@
+#include "reconstruction/pose/choose_start.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruction/pose/acceptance.h"
+
+namespace scan {
+namespace {
+
+constexpr int kViews = 8;  // that compare candidates
+constexpr int kFinal = 3;  // candidates compared with the full mesh
+
+// At most `count` of the views in use, evenly spread.
+std::vector<bool> Spread(const std::vector<bool>& use, int count) {
+  std::vector<std::size_t> members;
+  for (std::size_t i = 0; i < use.size(); ++i)
+    if (use[i]) members.push_back(i);
+  std::vector<bool> some(use.size(), false);
+  const std::size_t n = std::min<std::size_t>(members.size(), static_cast<std::size_t>(count));
+  for (std::size_t k = 0; k < n; ++k) some[members[k * members.size() / n]] = true;
+  return some;
+}
+
+struct Refined {
+  TableFromModel table_from_model;
+  double distance_px = 0;
+};
+
+Refined RefineFrom(const ContourMesh& mesh, RigModel& rig, int mounting,
+                   const TableFromModel& start, std::span<const PhotoContour> photos,
+                   const std::vector<bool>& use, const RefineOptions& options, double clip_px,
+                   std::stop_token stop) {
+  rig.set_start(mounting, start);
+  const RefineResult fit =
+      RefineJoint(mesh, rig, photos, use, rig.Nominal(), options, std::move(stop));
+  std::vector<double> distance(photos.size(), 0);
+  tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
+    if (!use[i]) return;
+    const int view = static_cast<int>(i);
+    const ViewState state{rig.CameraFromModelOf(fit.parameters, view),
+                          rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens),
+                          fit.parameters.mask_bias_px};
+    distance[i] = TwoWayDistance(mesh, photos[i], state, clip_px, options.spacing_px);
+  });
+  Refined refined{rig.TableFromModelOf(fit.parameters, mounting), 0};
+  double count = 0;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    refined.distance_px += distance[i];
+    count += use[i] ? 1 : 0;
+  }
+  refined.distance_px /= std::max(1.0, count);
+  return refined;
+}
+
+}  // namespace
+
+Result<std::vector<ChosenStart>> ChooseStarts(const ContourMesh& mesh, RigModel& rig,
+                                              std::span<const PhotoContour> photos,
+                                              const std::vector<bool>& use,
+                                              const std::vector<bool>& known,
+                                              const StartOptions& search,
+                                              const RefineOptions& refine, std::stop_token stop) {
+  const TriangleMesh coarse_triangles = ClusteredMesh(mesh.mesh, mesh.radius_mm / 50);
+  const bool coarser = coarse_triangles.faces.size() > 1000 &&
+                       2 * coarse_triangles.faces.size() < mesh.mesh.faces.size();
+  const ContourMesh coarse(coarser ? coarse_triangles : mesh.mesh);
+  const double unit = refine.last_window_px / 8;  // 1 at 1848 px
+  std::vector<ChosenStart> chosen(rig.mounting_ids().size());
+  for (std::size_t m = 0; m < chosen.size(); ++m) {
+    const int mounting = static_cast<int>(m);
+    chosen[m].table_from_model = rig.start(mounting);
+    if (known[m]) continue;
+    std::vector<bool> own = use;
+    for (std::size_t i = 0; i < own.size(); ++i)
+      own[i] = own[i] && rig.views()[i].mounting == mounting;
+    if (std::none_of(own.begin(), own.end(), [](bool u) { return u; })) continue;
+    const auto candidates = SearchStarts(mesh, rig, photos, own, search, stop);
+    if (stop.stop_requested()) return Cancelled("pose");
+    const std::vector<bool> some = Spread(own, kViews);
+    RefineOptions rough = refine;
+    rough.first_window_px = 60 * unit;
+    rough.last_window_px = 16 * unit;
+    rough.spacing_px = 3 * refine.spacing_px;
+    rough.max_iterations = 12;
+    rough.converged_px = 0.5 * unit;
+    std::vector<Refined> refined;
+    for (const StartCandidate& candidate : candidates) {
+      refined.push_back(RefineFrom(coarse, rig, mounting, candidate.table_from_model, photos, some,
+                                   rough, 40 * unit, stop));
+      if (stop.stop_requested()) return Cancelled("pose");
+    }
+    std::stable_sort(refined.begin(), refined.end(), [](const Refined& a, const Refined& b) {
+      return a.distance_px < b.distance_px;
+    });
+    RefineOptions fine = refine;
+    fine.first_window_px = 24 * unit;
+    fine.max_iterations = 8;
+    fine.converged_px = 0.1 * unit;
+    Refined best;
+    for (int k = 0; k < std::min(kFinal, static_cast<int>(refined.size())); ++k) {
+      if (k > 0 && refined[k].distance_px > 2 * refined[0].distance_px + unit) break;
+      const Refined full = RefineFrom(mesh, rig, mounting, refined[k].table_from_model, photos,
+                                      some, fine, 12 * unit, stop);
+      if (stop.stop_requested()) return Cancelled("pose");
+      if (k == 0 || full.distance_px < best.distance_px) best = full;
+    }
+    rig.set_start(mounting, best.table_from_model);
+    chosen[m] = {best.table_from_model, best.distance_px};
+  }
+  return chosen;
+}
+
+}  // namespace scan
