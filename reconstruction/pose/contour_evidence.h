@@ -80,7 +80,7 @@ double RobustSigma(std::span<const ContourMatch> matches);
 
 struct EvidenceWeights {
   double sigma_px = 1;          // of one residual
-  double correlation_px = 30;   // of contour that counts as one independent observation
+  double correlation_px = 43;   // of contour that counts as one independent observation
   double tukey_sigmas = 4.685;  // beyond this a match counts nothing
 };
 

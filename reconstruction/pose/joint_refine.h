@@ -19,7 +19,7 @@ struct RefineOptions {
   double first_window_px = 64;  // search along the normal; shrinks with the residuals
   double last_window_px = 8;
   double spacing_px = 4;         // of contour samples
-  double correlation_px = 30;    // of model discrepancy along the contour, see EvidenceWeights
+  double correlation_px = 43;    // of model discrepancy along the contour, see EvidenceWeights
   double sigma_floor_px = 0.15;  // sub-pixel contours; binary masks add a pixel's quantisation
   int max_iterations = 40;
   double converged_px = 0.01;  // largest motion of any view's surface in the last step

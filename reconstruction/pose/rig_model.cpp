@@ -33,6 +33,7 @@ double AtLeast(double sigma, double floor) { return std::hypot(sigma, floor); }
 RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(priors) {
   for (const LensState& lens : photos.lens_states) {
     intrinsics_.push_back(lens.intrinsics);
+    held_.push_back({true, true, true});
     lens_sigma_.push_back(lens.sigma);
     if (lens_sigma_.back().c_px <= 0) lens_sigma_.back().c_px = 0.003 * lens.intrinsics.w;
   }

@@ -86,6 +86,11 @@ class RigModel {
   }
   const TableFromModel& start(int mounting) const { return start_[mounting]; }
 
+  // Lens parameters (log focal length, principal point x, y) that the solve holds at the nominal
+  // value; all of them at first.
+  bool held(int lens, int parameter) const { return held_[lens][parameter]; }
+  void set_held(int lens, int parameter, bool held) { held_[lens][parameter] = held; }
+
   RigParameters Nominal() const;
 
   CameraFromTable NominalCameraFromTable(int view) const;
@@ -104,6 +109,7 @@ class RigModel {
   std::vector<RigidSigma> aim_sigma_;
   std::vector<IntrinsicsSigma> lens_sigma_;
   std::vector<Intrinsics> intrinsics_;
+  std::vector<std::array<bool, 3>> held_;
   std::vector<TableFromModel> start_;
 };
 

@@ -191,7 +191,10 @@ Eigen::VectorXd PriorSigma(const RigModel& rig, const RigLayout& layout) {
 double SolveRig(const RigModel& rig, std::span<const std::optional<CondensedEvidence>> evidence,
                 RigParameters& parameters) {
   const RigLayout layout(rig);
-  const Eigen::VectorXd sigma = PriorSigma(rig, layout);
+  Eigen::VectorXd sigma = PriorSigma(rig, layout);
+  for (int lens = 0; lens < static_cast<int>(rig.lens_sigma().size()); ++lens)
+    for (int k = 0; k < 3; ++k)
+      if (rig.held(lens, k)) sigma[layout.lens(lens) + k] = k == 0 ? 1e-9 : 1e-6;
   ceres::Problem problem;
   auto* ordering = new ceres::ParameterBlockOrdering;
   Eigen::VectorXd x = Pack(layout, parameters);

@@ -32,6 +32,7 @@ struct RigLayout {
 Eigen::VectorXd PriorSigma(const RigModel& rig, const RigLayout& layout);
 
 // Moves `parameters` to the minimum of  1/2 sum (x / sigma)^2 + sum of the views' quadratic forms.
+// Lens parameters that the rig holds stay at their nominal value.
 // Views without evidence are held by their priors alone. Ceres with one thread: bit-stable; the
 // parallel work is in the condensation before.
 // Returns the cost at the minimum. Thread contract: pure.

@@ -34,6 +34,21 @@ double ScaleOf(const PhotoSet& photos) {
   return photos.intrinsics(photos.photos.front()).w / 1848.0;
 }
 
+// Focal length and principal point are freed only where the data know them better than half of
+// their prior: else they would only soak up what the model leaves out. True when one was freed.
+bool FreeWhatIsSeen(RigModel& rig, const RigPosterior& posterior) {
+  bool freed = false;
+  for (int lens = 0; lens < static_cast<int>(rig.lens_sigma().size()); ++lens) {
+    for (int k = 0; k < 3; ++k) {
+      const int at = posterior.layout.lens(lens) + k;
+      if (std::sqrt(posterior.covariance(at, at)) >= 0.5 * posterior.prior_sigma[at]) continue;
+      freed |= rig.held(lens, k);
+      rig.set_held(lens, k, false);
+    }
+  }
+  return freed;
+}
+
 // A view's own deviations in units of their priors.
 double ViewPriorChi2(const RigPosterior& posterior, const RigParameters& parameters, int view) {
   double chi2 = 0;
@@ -176,6 +191,12 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
   Report(progress, "poses: refine", 0.5);
   RefineResult fit = RefineJoint(contour_mesh, rig, contours, use, rig.Nominal(), refine, stop);
   auto judgements = Judge(contour_mesh, rig, contours, fit, use, options, scale, refine.spacing_px);
+  if (FreeWhatIsSeen(rig, PosteriorOf(rig, fit))) {
+    RefineOptions again = refine;
+    again.first_window_px = 2 * refine.last_window_px;
+    fit = RefineJoint(contour_mesh, rig, contours, use, fit.parameters, again, stop);
+    judgements = Judge(contour_mesh, rig, contours, fit, use, options, scale, refine.spacing_px);
+  }
   // Views that disagree are taken out and the others solved again, so that nothing of them is
   // spread; then every view is judged once more at the pose that the others give it.
   std::vector<bool> agree = use;
