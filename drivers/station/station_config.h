@@ -39,7 +39,7 @@ struct CameraConfig {
   LensConfig lens;
   double exposure_us = 8000;
   double gain = 1;
-  double sigma_fl_rel = 0.01;       // what is known of the focal length
+  double sigma_fl_rel = 0.0005;     // what is known of the focal length: calibrated
   double sigma_c_px = 0;            // and of the principal point; 0: 0.3 % of the width
   double sigma_rotation_deg = 0.2;  // of camera_from_lift, each of three components
   double sigma_translation_mm = 0.5;

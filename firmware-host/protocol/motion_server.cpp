@@ -1,5 +1,8 @@
 #include "firmware-host/protocol/motion_server.h"
 
+#include <memory>
+#include <mutex>
+
 #include "drivers/base/log.h"
 #include "firmware-host/protocol/motion_messages.h"
 
@@ -11,21 +14,37 @@ Result<Json> Done(const Status& status) {
   return Json::object();
 }
 
+// One client moves at a time, whichever connection it came by.
+template <class Move>
+Result<Json> MoveAlone(std::mutex& moving, Move move) {
+  const std::unique_lock lock(moving, std::try_to_lock);
+  if (!lock)
+    return BadInput("another client moves the stage", "motion", "wait for it or send stop");
+  return move();
+}
+
 }  // namespace
 
 RpcFunctions MotionFunctions(Motion& motion) {
   RpcFunctions functions;
-  functions["home"] = {[&motion](const Json&, std::stop_token stop) -> Result<Json> {
-                         SCAN_TRY(const HomeReport report, motion.Home(stop));
-                         return ToJson(report);
-                       },
-                       /*immediate=*/false};
-  functions["move_to"] = {[&motion](const Json& params, std::stop_token stop) -> Result<Json> {
-                            SCAN_TRY(const StageTarget target, StageTargetFromJson(params));
-                            SCAN_TRY(const MoveReport report, motion.MoveTo(target, stop));
-                            return ToJson(report);
-                          },
-                          /*immediate=*/false};
+  const auto moving = std::make_shared<std::mutex>();
+  functions["home"] = {
+      [&motion, moving](const Json&, std::stop_token stop) {
+        return MoveAlone(*moving, [&]() -> Result<Json> {
+          SCAN_TRY(const HomeReport report, motion.Home(stop));
+          return ToJson(report);
+        });
+      },
+      /*immediate=*/false};
+  functions["move_to"] = {
+      [&motion, moving](const Json& params, std::stop_token stop) {
+        return MoveAlone(*moving, [&]() -> Result<Json> {
+          SCAN_TRY(const StageTarget target, StageTargetFromJson(params));
+          SCAN_TRY(const MoveReport report, motion.MoveTo(target, stop));
+          return ToJson(report);
+        });
+      },
+      /*immediate=*/false};
   functions["stop"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Stop()); },
                        /*immediate=*/true, /*cancels=*/true};
   functions["abort"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Abort()); },

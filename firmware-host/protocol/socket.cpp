@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 
@@ -68,6 +69,12 @@ Result<UniqueFd> ConnectUnix(const std::filesystem::path& path,
                     "start scanstationd, or name its socket with --socket");
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
+}
+
+std::filesystem::path DefaultSocket() {
+  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
+    return std::filesystem::path(runtime) / "scanstation.sock";
+  return "/run/scanstation/scanstation.sock";
 }
 
 Result<std::pair<UniqueFd, UniqueFd>> SocketPair() {

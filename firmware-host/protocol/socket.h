@@ -19,6 +19,10 @@ Result<UniqueFd> ListenUnix(const std::filesystem::path& path);
 Result<UniqueFd> ConnectUnix(const std::filesystem::path& path,
                              std::chrono::milliseconds patience = std::chrono::milliseconds(0));
 
+// Where scanstationd listens unless told otherwise: $XDG_RUNTIME_DIR/scanstation.sock, else
+// /run/scanstation/scanstation.sock.
+std::filesystem::path DefaultSocket();
+
 // Two connected sockets, for roles that share a process.
 Result<std::pair<UniqueFd, UniqueFd>> SocketPair();
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/base/sha256.h"
+#include "drivers/base/staged_folder.h"
 #include "tests/support/temp_folder.h"
 
 namespace scan {
@@ -36,6 +37,33 @@ TEST(Files, OutputFolderIsNotOverwrittenWithoutForce) {
   EXPECT_TRUE(PrepareOutputFolder(out, true));
   EXPECT_FALSE(PrepareOutputFile(out / "x", false));
   EXPECT_FALSE(PrepareOutputFile(out, true)) << "a folder is never replaced by a file";
+}
+
+TEST(StagedFolder, AppearsOnCommitAndOnlyThen) {
+  TempFolder folder;
+  const auto out = folder.path() / "out";
+  {
+    auto staged = StagedFolder::Create(out, false);
+    ASSERT_TRUE(staged);
+    ASSERT_TRUE(WriteFileDurably(staged->path() / "a", std::string_view("1")));
+    EXPECT_FALSE(std::filesystem::exists(out));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << "never committed: nothing stays";
+  {
+    auto staged = StagedFolder::Create(out, false);
+    ASSERT_TRUE(WriteFileDurably(staged->path() / "a", std::string_view("1")));
+    ASSERT_TRUE(staged->Commit());
+  }
+  EXPECT_TRUE(std::filesystem::exists(out / "a"));
+  EXPECT_EQ(StagedFolder::Create(out, false).error().kind, ErrorKind::bad_input);
+  {
+    auto staged = StagedFolder::Create(out, true);
+    ASSERT_TRUE(WriteFileDurably(staged->path() / "b", std::string_view("2")));
+    ASSERT_TRUE(staged->Commit());
+  }
+  EXPECT_FALSE(std::filesystem::exists(out / "a")) << "force replaces the whole";
+  EXPECT_TRUE(std::filesystem::exists(out / "b"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST(Files, Sha256OfTheEmptyStringAndOfAbc) {

@@ -1,0 +1,25 @@
+#include "firmware-host/cli/commands.h"
+
+namespace scan {
+
+void AddAllCommands(CommandSet& commands) {
+#ifdef SCAN_RECONSTRUCTION
+  AddDemo(commands);
+#endif
+  AddCapture(commands);
+  AddResume(commands);
+  AddStationControl(commands);
+  AddReplay(commands);
+  AddVerify(commands);
+  AddImport(commands);
+#ifdef SCAN_RECONSTRUCTION
+  AddSurface(commands);
+  AddAtlas(commands);
+  AddMasks(commands);
+  AddPose(commands);
+  AddTexture(commands);
+  AddReconstruct(commands);
+#endif
+}
+
+}  // namespace scan

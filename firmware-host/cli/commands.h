@@ -1,0 +1,31 @@
+// Every subcommand of scanstation, one function each in a file of its own group.
+#pragma once
+
+#include "firmware-host/cli/command.h"
+
+namespace scan {
+
+void AddAllCommands(CommandSet& commands);
+
+// station_commands.cpp: clients of scanstationd
+void AddCapture(CommandSet& commands);
+void AddResume(CommandSet& commands);
+void AddStationControl(CommandSet& commands);  // status stop pause continue
+
+// session_commands.cpp
+void AddReplay(CommandSet& commands);
+void AddVerify(CommandSet& commands);
+void AddImport(CommandSet& commands);
+
+// model_commands.cpp
+void AddSurface(CommandSet& commands);
+void AddAtlas(CommandSet& commands);
+void AddMasks(CommandSet& commands);
+void AddPose(CommandSet& commands);
+void AddTexture(CommandSet& commands);
+void AddReconstruct(CommandSet& commands);
+
+// demo_command.cpp
+void AddDemo(CommandSet& commands);
+
+}  // namespace scan

@@ -1,0 +1,21 @@
+// The specimen that the simulated station photographs.
+#pragma once
+
+#include <string>
+
+#include "drivers/base/result.h"
+#include "drivers/station/true_state.h"
+#include "reconstruction/mesh/mesh.h"
+
+namespace scan {
+
+struct SimScene {
+  SceneRenderer renderer;
+  BoundingBox specimen_bounds;  // model frame, mm
+};
+
+// Errors: bad_input for an unknown specimen, or in a build without the reconstruction half, which
+// has no synthetic specimens.
+Result<SimScene> MakeSimScene(const std::string& specimen);
+
+}  // namespace scan
