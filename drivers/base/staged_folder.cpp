@@ -17,8 +17,8 @@ Result<StagedFolder> StagedFolder::Create(const fs::path& target, bool force) {
   const bool existed = fs::exists(clean);
   SCAN_CHECK(PrepareOutputFolder(clean, force));
   if (!existed) fs::remove(clean);  // it was only made to see that it can be
-  fs::path staging =
-      clean.parent_path() / ("." + clean.filename().string() + ".part-" + std::to_string(::getpid()));
+  fs::path staging = clean.parent_path() /
+                     ("." + clean.filename().string() + ".part-" + std::to_string(::getpid()));
   std::error_code code;
   fs::remove_all(staging, code);
   fs::create_directories(staging, code);

@@ -15,7 +15,7 @@ namespace scan {
 using Json = nlohmann::json;
 
 struct CliContext {
-  bool json = false;     // results as JSON on standard output
+  bool json = false;  // results as JSON on standard output
   bool verbose = false;
   ProgressFn progress;   // quiet when standard error is no terminal
   std::stop_token stop;  // requested by SIGINT and SIGTERM

@@ -34,9 +34,8 @@ Result<std::unique_ptr<RpcClient>> ConnectDaemon(const std::filesystem::path& so
 Result<Json> CaptureAndFollow(RpcClient& daemon, const Json& params, const ProgressFn& progress,
                               std::stop_token stop) {
   SCAN_CHECK(daemon.Call("capture", params, kPatience));
-  const std::stop_callback on_stop(stop, [&daemon] {
-    (void)daemon.Call("stop", Json::object(), kPatience);
-  });
+  const std::stop_callback on_stop(
+      stop, [&daemon] { (void)daemon.Call("stop", Json::object(), kPatience); });
   while (true) {
     SCAN_TRY(const Json status, daemon.Call("status", Json::object(), kPatience));
     const double count = status.value("view_count", 0);

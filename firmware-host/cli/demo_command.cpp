@@ -34,8 +34,8 @@ struct DemoPaths {
 };
 
 DemoPaths PathsIn(const fs::path& folder) {
-  return {folder / "session", folder / "ct.mha",  folder / "model", folder / "truth.jsonl",
-          folder / "log",     folder / "station.toml"};
+  return {folder / "session",     folder / "ct.mha", folder / "model",
+          folder / "truth.jsonl", folder / "log",    folder / "station.toml"};
 }
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -51,8 +51,8 @@ Status WriteStationFile(const DemoOptions& options, const fs::path& path) {
 
 // The capture goes the way every capture goes: through a scanstationd of its own.
 Status CaptureDemo(const DemoPaths& paths, const CliContext& context) {
-  const fs::path socket = fs::temp_directory_path() /
-                          fmt::format("scanstation-demo-{}.sock", ::getpid());
+  const fs::path socket =
+      fs::temp_directory_path() / fmt::format("scanstation-demo-{}.sock", ::getpid());
   SCAN_TRY(const auto daemon,
            ChildProcess::Start(ProgramFolder() / "scanstationd",
                                {"--config", paths.config.string(), "--socket", socket.string(),
@@ -130,8 +130,8 @@ CommandOutput MakeOutput(const DemoPaths& paths, const ReconstructResult& result
       "texture measured {:8.1f} % of the surface\n"
       "time\n{}  {:<12} {:6.1f} s\n"
       "session  {}\nmodel    {}\nreport   {}\nlog      {}\n",
-      result.views_accepted, result.poses.views.size(), score.centre_mm.median,
-      score.centre_mm.p95, score.centre_mm.max, score.rotation_deg.median, score.rotation_deg.p95,
+      result.views_accepted, result.poses.views.size(), score.centre_mm.median, score.centre_mm.p95,
+      score.centre_mm.max, score.rotation_deg.median, score.rotation_deg.p95,
       score.rotation_deg.max, score.surface_px.median, score.surface_px.p95, score.surface_px.max,
       100 * result.coverage, times, "total", total, paths.session.string(), result.model.string(),
       result.report.string(), paths.log.string());

@@ -41,10 +41,10 @@ class SignalWatch {
 int Report(const scan::Error& error, bool json) {
   fmt::print(stderr, "scanstation: {}\n", ToString(error));
   if (json)
-    fmt::print("{}\n", scan::Json{{"error", {{"what", error.what},
-                                             {"where", error.where},
-                                             {"mend", error.mend}}}}
-                           .dump(2));
+    fmt::print(
+        "{}\n",
+        scan::Json{{"error", {{"what", error.what}, {"where", error.where}, {"mend", error.mend}}}}
+            .dump(2));
   return ExitCode(error);
 }
 

@@ -46,14 +46,13 @@ void AddVolumeOptions(CLI::App& command, ModelOptions& options) {
       ->delimiter(',')
       ->expected(1, 3)
       ->check(CLI::PositiveNumber);
-  command
-      .add_option_function<double>(
-          "--threshold",
-          [&options](const double& value) {
-            options.threshold = value;
-            options.has_threshold = true;
-          },
-          "grey value of the surface; automatic without it");
+  command.add_option_function<double>(
+      "--threshold",
+      [&options](const double& value) {
+        options.threshold = value;
+        options.has_threshold = true;
+      },
+      "grey value of the surface; automatic without it");
   command.add_option("--faces", options.stages.surface.decimate.faces, "size of the mesh")
       ->capture_default_str();
 }
@@ -117,14 +116,14 @@ Result<CommandOutput> RunAtlas(ModelOptions& options, const CliContext& context)
            MakeAtlas(mesh, options.stages.atlas, context.progress, context.stop));
   SCAN_CHECK(WriteAtlasObj(options.out, atlas.atlas, ""));
   const AtlasReport& report = atlas.report;
-  return CommandOutput{{{"atlas", options.out.string()},
-                        {"charts", report.charts},
-                        {"texels_per_mm", report.texels_per_mm},
-                        {"stretch_l2", report.stretch_l2},
-                        {"texel_usage", report.texel_usage}},
-                       fmt::format("{} charts, L2 stretch {:.3f}, {:.0f} % of the atlas used: {}\n",
-                                   report.charts, report.stretch_l2, 100 * report.texel_usage,
-                                   options.out.string())};
+  return CommandOutput{
+      {{"atlas", options.out.string()},
+       {"charts", report.charts},
+       {"texels_per_mm", report.texels_per_mm},
+       {"stretch_l2", report.stretch_l2},
+       {"texel_usage", report.texel_usage}},
+      fmt::format("{} charts, L2 stretch {:.3f}, {:.0f} % of the atlas used: {}\n", report.charts,
+                  report.stretch_l2, 100 * report.texel_usage, options.out.string())};
 }
 
 Result<CommandOutput> RunMasks(ModelOptions& options, const CliContext& context) {
@@ -213,25 +212,26 @@ Result<CommandOutput> RunReconstruct(ModelOptions& options, const CliContext& co
        {"report", result.report.string()},
        {"poses", result.poses_file.string()}},
       PoseText(result.poses) +
-          fmt::format("{} of {} views accepted, {:.1f} % of the surface measured\nmodel   {}\nreport  {}\n",
-                      result.views_accepted, result.poses.views.size(), 100 * result.coverage,
-                      result.model.string(), result.report.string())};
+          fmt::format(
+              "{} of {} views accepted, {:.1f} % of the surface measured\nmodel   {}\nreport  {}\n",
+              result.views_accepted, result.poses.views.size(), 100 * result.coverage,
+              result.model.string(), result.report.string())};
 }
 
 using RunModel = Result<CommandOutput> (*)(ModelOptions&, const CliContext&);
 
 CLI::App& AddModel(CommandSet& commands, const char* name, const char* description, RunModel run,
                    const std::shared_ptr<ModelOptions>& options) {
-  return commands.Add(name, description, [options, run](const CliContext& context) {
-    return run(*options, context);
-  });
+  return commands.Add(name, description,
+                      [options, run](const CliContext& context) { return run(*options, context); });
 }
 
 }  // namespace
 
 void AddSurface(CommandSet& commands) {
   auto options = std::make_shared<ModelOptions>();
-  CLI::App& command = AddModel(commands, "surface", "CT volume to a closed mesh", RunSurface, options);
+  CLI::App& command =
+      AddModel(commands, "surface", "CT volume to a closed mesh", RunSurface, options);
   command.add_option("volume", options->volume, "volume file or folder of slices")->required();
   AddOut(command, *options, "PLY file to write");
   AddVolumeOptions(command, *options);
@@ -248,16 +248,16 @@ void AddAtlas(CommandSet& commands) {
 
 void AddMasks(CommandSet& commands) {
   auto options = std::make_shared<ModelOptions>();
-  CLI::App& command = AddModel(commands, "masks",
-                               "Cut the specimen out of a session's photographs (derived/masks)",
-                               RunMasks, options);
+  CLI::App& command =
+      AddModel(commands, "masks", "Cut the specimen out of a session's photographs (derived/masks)",
+               RunMasks, options);
   command.add_option("session", options->session, "session folder")->required();
 }
 
 void AddPose(CommandSet& commands) {
   auto options = std::make_shared<ModelOptions>();
-  CLI::App& command = AddModel(commands, "pose", "Find the camera of every photograph against a mesh",
-                               RunPose, options);
+  CLI::App& command = AddModel(
+      commands, "pose", "Find the camera of every photograph against a mesh", RunPose, options);
   command.add_option("session", options->session, "session folder")->required();
   command.add_option("--mesh", options->mesh, "PLY or OBJ file, mm")->required();
   AddOut(command, *options, "folder to write");

@@ -60,22 +60,22 @@ Result<CommandOutput> RunImport(SessionOptions& options, const CliContext& conte
   options.import.software_version = SCAN_VERSION;
   SCAN_TRY(const ImportReport report,
            ImportPhotographs(options.import, context.progress, context.stop));
-  return CommandOutput{{{"session", report.session.string()},
-                        {"photographs", report.photographs},
-                        {"with_pose", report.with_pose},
-                        {"with_mask", report.with_mask}},
-                       fmt::format("{} photographs, {} with a pose, {} with a mask: {}\n",
-                                   report.photographs, report.with_pose, report.with_mask,
-                                   report.session.string())};
+  return CommandOutput{
+      {{"session", report.session.string()},
+       {"photographs", report.photographs},
+       {"with_pose", report.with_pose},
+       {"with_mask", report.with_mask}},
+      fmt::format("{} photographs, {} with a pose, {} with a mask: {}\n", report.photographs,
+                  report.with_pose, report.with_mask, report.session.string())};
 }
 
 }  // namespace
 
 void AddReplay(CommandSet& commands) {
   auto options = std::make_shared<SessionOptions>();
-  CLI::App& command = commands.Add(
-      "replay", "Run a recorded session's capture again without devices and compare",
-      [options](const CliContext&) { return RunReplay(*options); });
+  CLI::App& command =
+      commands.Add("replay", "Run a recorded session's capture again without devices and compare",
+                   [options](const CliContext&) { return RunReplay(*options); });
   command.add_option("session", options->session, "recorded session folder")->required();
   command.add_option("--out", options->out, "session folder to write")->required();
 }

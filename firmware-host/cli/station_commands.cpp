@@ -20,9 +20,8 @@ Result<CommandOutput> RunCaptureCommand(const StationOptions& options, bool resu
                                         const CliContext& context) {
   SCAN_TRY(const auto daemon, ConnectDaemon(options.socket));
   const std::string session = std::filesystem::absolute(options.session).string();
-  SCAN_TRY(const Json status,
-           CaptureAndFollow(*daemon, {{"out", session}, {"resume", resume}}, context.progress,
-                            context.stop));
+  SCAN_TRY(const Json status, CaptureAndFollow(*daemon, {{"out", session}, {"resume", resume}},
+                                               context.progress, context.stop));
   return CommandOutput{status,
                        fmt::format("{} of {} views in {}\n", status.value("views_accepted", 0),
                                    status.value("view_count", 0), session)};
@@ -30,8 +29,7 @@ Result<CommandOutput> RunCaptureCommand(const StationOptions& options, bool resu
 
 Result<CommandOutput> CallSimple(const StationOptions& options, const std::string& call) {
   SCAN_TRY(const auto daemon, ConnectDaemon(options.socket));
-  SCAN_TRY(const Json answer,
-           daemon->Call(call, Json::object(), std::chrono::milliseconds(10000)));
+  SCAN_TRY(const Json answer, daemon->Call(call, Json::object(), std::chrono::milliseconds(10000)));
   return CommandOutput{answer, call == "status" ? "" : "done\n"};
 }
 
@@ -59,11 +57,9 @@ std::shared_ptr<StationOptions> AddSocketOption(CLI::App& command,
 
 void AddCapture(CommandSet& commands) {
   auto options = std::make_shared<StationOptions>();
-  CLI::App& command =
-      commands.Add("capture", "Capture a specimen on the station and follow it to its end",
-                   [options](const CliContext& context) {
-                     return RunCaptureCommand(*options, false, context);
-                   });
+  CLI::App& command = commands.Add(
+      "capture", "Capture a specimen on the station and follow it to its end",
+      [options](const CliContext& context) { return RunCaptureCommand(*options, false, context); });
   AddSocketOption(command, options);
   command.add_option("--out", options->session, "session folder to write")->required();
 }
@@ -80,18 +76,17 @@ void AddResume(CommandSet& commands) {
 void AddStationControl(CommandSet& commands) {
   {
     auto options = std::make_shared<StationOptions>();
-    AddSocketOption(commands.Add("status", "What the station is doing",
-                                 [options](const CliContext&) { return ReadStatusCommand(*options); }),
-                    options);
+    AddSocketOption(
+        commands.Add("status", "What the station is doing",
+                     [options](const CliContext&) { return ReadStatusCommand(*options); }),
+        options);
   }
-  const auto add_simple = [&commands](const char* name, const char* description,
-                                      const char* call) {
+  const auto add_simple = [&commands](const char* name, const char* description, const char* call) {
     auto options = std::make_shared<StationOptions>();
-    AddSocketOption(commands.Add(name, description,
-                                 [options, call](const CliContext&) {
-                                   return CallSimple(*options, call);
-                                 }),
-                    options);
+    AddSocketOption(
+        commands.Add(name, description,
+                     [options, call](const CliContext&) { return CallSimple(*options, call); }),
+        options);
   };
   add_simple("stop", "Stop motion and end the capture; the session stays valid", "stop");
   add_simple("pause", "Pause the capture before its next step", "pause");

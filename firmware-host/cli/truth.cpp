@@ -23,9 +23,17 @@ PoseOf PoseFrom(const nlohmann::json& line) {
   const auto& in = line.at("intrinsics");
   const auto number = [&in](const char* key) { return in.at(key).get<double>(); };
   return {CameraFromModel(isometry),
-          {.w = in.at("w").get<int>(), .h = in.at("h").get<int>(), .fl_x = number("fl_x"),
-           .fl_y = number("fl_y"), .cx = number("cx"), .cy = number("cy"), .k1 = number("k1"),
-           .k2 = number("k2"), .p1 = number("p1"), .p2 = number("p2"), .k3 = number("k3")}};
+          {.w = in.at("w").get<int>(),
+           .h = in.at("h").get<int>(),
+           .fl_x = number("fl_x"),
+           .fl_y = number("fl_y"),
+           .cx = number("cx"),
+           .cy = number("cy"),
+           .k1 = number("k1"),
+           .k2 = number("k2"),
+           .p1 = number("p1"),
+           .p2 = number("p2"),
+           .k3 = number("k3")}};
 }
 
 Result<std::map<FrameKey, PoseOf>> ReadFrames(const std::filesystem::path& path) {

@@ -15,7 +15,6 @@ namespace scan {
 // `scanstationd --truth` wrote; frames are matched by camera and sensor sequence.
 // Errors: bad_input when the file or a frame is missing.
 Result<std::vector<PoseOf>> ReadTruth(const std::filesystem::path& truth,
-                                         const std::filesystem::path& session,
-                                         const PhotoSet& photos);
+                                      const std::filesystem::path& session, const PhotoSet& photos);
 
 }  // namespace scan

@@ -22,13 +22,11 @@ RpcFunctions DaemonFunctions(CaptureService& service, RequestMaker make_request,
     service.Stop();
     return Json::object();
   }};
-  functions["pause"] = {
-      [&service](const Json&, std::stop_token) { return Done(service.Pause()); }};
+  functions["pause"] = {[&service](const Json&, std::stop_token) { return Done(service.Pause()); }};
   functions["resume"] = {
       [&service](const Json&, std::stop_token) { return Done(service.Resume()); }};
-  functions["status"] = {[&service](const Json&, std::stop_token) -> Result<Json> {
-    return service.ReadStatus();
-  }};
+  functions["status"] = {
+      [&service](const Json&, std::stop_token) -> Result<Json> { return service.ReadStatus(); }};
   functions["shutdown"] = {[on_shutdown](const Json&, std::stop_token) -> Result<Json> {
     on_shutdown();
     return Json::object();

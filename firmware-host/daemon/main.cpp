@@ -64,11 +64,10 @@ Status Serve(const DaemonOptions& options) {
   SCAN_TRY(const auto host, SimHost::Start(config, options.truth));
   CaptureService service(host->station());
   SCAN_TRY(const auto page, StartPage(options, service));
-  SCAN_TRY(const auto server,
-           RpcServer::Start(options.socket,
-                            DaemonFunctions(service, MakeRequests(config, *host),
-                                            [] { ::kill(::getpid(), SIGTERM); }),
-                            std::chrono::milliseconds(0)));
+  SCAN_TRY(const auto server, RpcServer::Start(options.socket,
+                                               DaemonFunctions(service, MakeRequests(config, *host),
+                                                               [] { ::kill(::getpid(), SIGTERM); }),
+                                               std::chrono::milliseconds(0)));
   Log(LogLevel::info, "ready", {{"socket", options.socket.string()}, {"station", config.name}});
   int signal = 0;
   sigwait(&signals, &signal);
@@ -86,7 +85,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", SCAN_VERSION);
   app.add_option("--config", options.config, "station file (configs/*.toml)")->required();
   app.add_option("--socket", options.socket, "Unix socket to listen on")->capture_default_str();
-  app.add_option("--page-port", options.page_port, "port of the page on 127.0.0.1; 0: any, -1: none")
+  app.add_option("--page-port", options.page_port,
+                 "port of the page on 127.0.0.1; 0: any, -1: none")
       ->capture_default_str();
   app.add_option("--truth", options.truth,
                  "simulation only: write the true camera of every frame here");

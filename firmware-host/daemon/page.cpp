@@ -59,22 +59,25 @@ Result<std::unique_ptr<Page>> Page::Start(int port, PageBackend backend) {
   server.Get("/", [](const httplib::Request&, httplib::Response& response) {
     response.set_content(kPageHtml, "text/html; charset=utf-8");
   });
-  server.Get("/api/status", [raw = impl.get()](const httplib::Request&, httplib::Response& response) {
-    response.set_content(raw->backend.status().dump(), "application/json");
-  });
-  server.Get("/api/picture", [raw = impl.get()](const httplib::Request&, httplib::Response& response) {
-    const auto path = raw->backend.last_picture();
-    const auto bytes = path.empty() ? Result<std::string>("") : ReadTextFile(path);
-    if (!bytes || bytes->empty()) {
-      response.status = 404;
-      return;
-    }
-    response.set_content(*bytes, MimeOf(path).c_str());
-  });
-  server.Post("/api/stop", [raw = impl.get()](const httplib::Request&, httplib::Response& response) {
-    raw->backend.stop();
-    response.set_content("{}", "application/json");
-  });
+  server.Get("/api/status",
+             [raw = impl.get()](const httplib::Request&, httplib::Response& response) {
+               response.set_content(raw->backend.status().dump(), "application/json");
+             });
+  server.Get("/api/picture",
+             [raw = impl.get()](const httplib::Request&, httplib::Response& response) {
+               const auto path = raw->backend.last_picture();
+               const auto bytes = path.empty() ? Result<std::string>("") : ReadTextFile(path);
+               if (!bytes || bytes->empty()) {
+                 response.status = 404;
+                 return;
+               }
+               response.set_content(*bytes, MimeOf(path).c_str());
+             });
+  server.Post("/api/stop",
+              [raw = impl.get()](const httplib::Request&, httplib::Response& response) {
+                raw->backend.stop();
+                response.set_content("{}", "application/json");
+              });
   impl->port = port == 0 ? server.bind_to_any_port("127.0.0.1")
                          : (server.bind_to_port("127.0.0.1", port) ? port : -1);
   if (impl->port <= 0)

@@ -12,8 +12,8 @@ namespace scan {
 
 // What the page needs of the daemon. Thread contract: called from the page's threads.
 struct PageBackend {
-  std::function<nlohmann::json()> status;              // as the call `status`
-  std::function<void()> stop;                          // as the call `stop`
+  std::function<nlohmann::json()> status;               // as the call `status`
+  std::function<void()> stop;                           // as the call `stop`
   std::function<std::filesystem::path()> last_picture;  // empty: none yet
 };
 

@@ -46,16 +46,23 @@ Json TruthLine(const FrameTruth& frame) {
           {"sensor_sequence", frame.sensor_sequence},
           {"camera_from_model", RowsOf(frame.state.camera_from_model)},
           {"intrinsics",
-           {{"w", in.w}, {"h", in.h}, {"fl_x", in.fl_x}, {"fl_y", in.fl_y}, {"cx", in.cx},
-            {"cy", in.cy}, {"k1", in.k1}, {"k2", in.k2}, {"p1", in.p1}, {"p2", in.p2},
+           {{"w", in.w},
+            {"h", in.h},
+            {"fl_x", in.fl_x},
+            {"fl_y", in.fl_y},
+            {"cx", in.cx},
+            {"cy", in.cy},
+            {"k1", in.k1},
+            {"k2", in.k2},
+            {"p1", in.p1},
+            {"p2", in.p2},
             {"k3", in.k3}}}};
 }
 
 Result<TruthSink> MakeTruthSink(const std::filesystem::path& path) {
   if (path.empty()) return TruthSink();
   auto file = std::make_shared<std::ofstream>(path, std::ios::trunc);
-  if (!*file)
-    return BadInput("cannot write the truth file", path.string(), "name another --truth");
+  if (!*file) return BadInput("cannot write the truth file", path.string(), "name another --truth");
   return TruthSink([file](const FrameTruth& frame) { *file << TruthLine(frame) << std::endl; });
 }
 

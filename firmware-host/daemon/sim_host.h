@@ -15,9 +15,9 @@
 
 namespace scan {
 
-// One SimWorld, one virtual clock; motion is reached over the protocol of scanstation-motiond, served
-// by a thread of this process. Only one role works at a time (the runner waits for each answer), so
-// virtual time never runs ahead of a role that still has work to do.
+// One SimWorld, one virtual clock; motion is reached over the protocol of scanstation-motiond,
+// served by a thread of this process. Only one role works at a time (the runner waits for each
+// answer), so virtual time never runs ahead of a role that still has work to do.
 class SimHost {
  public:
   // `truth` (may be empty): a file that gets one JSON line a frame with the true camera.

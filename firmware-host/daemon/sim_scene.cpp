@@ -13,9 +13,9 @@ Result<SimScene> MakeSimScene(const std::string& specimen) {
   const auto photographed = std::make_shared<const PhotographScene>(
       MakePhotographScene(std::shared_ptr<const Specimen>(std::move(made))));
   scene.renderer = [photographed](const TrueState& state) -> Result<cv::Mat> {
-    return RenderPhotograph(*photographed, state.camera_from_model, state.intrinsics,
-                            {.specimen_present = state.specimen_present,
-                             .light_on = state.light_on});
+    return RenderPhotograph(
+        *photographed, state.camera_from_model, state.intrinsics,
+        {.specimen_present = state.specimen_present, .light_on = state.light_on});
   };
   return scene;
 }

@@ -6,8 +6,8 @@
 
 #include "drivers/base/clock.h"
 #include "drivers/base/log.h"
-#include "drivers/station/station_file.h"
 #include "drivers/station/sim_station.h"
+#include "drivers/station/station_file.h"
 #include "firmware-host/protocol/motion_server.h"
 #include "firmware-host/protocol/rpc_server.h"
 

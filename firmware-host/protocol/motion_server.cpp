@@ -28,23 +28,21 @@ Result<Json> MoveAlone(std::mutex& moving, Move move) {
 RpcFunctions MotionFunctions(Motion& motion) {
   RpcFunctions functions;
   const auto moving = std::make_shared<std::mutex>();
-  functions["home"] = {
-      [&motion, moving](const Json&, std::stop_token stop) {
-        return MoveAlone(*moving, [&]() -> Result<Json> {
-          SCAN_TRY(const HomeReport report, motion.Home(stop));
-          return ToJson(report);
-        });
-      },
-      /*immediate=*/false};
-  functions["move_to"] = {
-      [&motion, moving](const Json& params, std::stop_token stop) {
-        return MoveAlone(*moving, [&]() -> Result<Json> {
-          SCAN_TRY(const StageTarget target, StageTargetFromJson(params));
-          SCAN_TRY(const MoveReport report, motion.MoveTo(target, stop));
-          return ToJson(report);
-        });
-      },
-      /*immediate=*/false};
+  functions["home"] = {[&motion, moving](const Json&, std::stop_token stop) {
+                         return MoveAlone(*moving, [&]() -> Result<Json> {
+                           SCAN_TRY(const HomeReport report, motion.Home(stop));
+                           return ToJson(report);
+                         });
+                       },
+                       /*immediate=*/false};
+  functions["move_to"] = {[&motion, moving](const Json& params, std::stop_token stop) {
+                            return MoveAlone(*moving, [&]() -> Result<Json> {
+                              SCAN_TRY(const StageTarget target, StageTargetFromJson(params));
+                              SCAN_TRY(const MoveReport report, motion.MoveTo(target, stop));
+                              return ToJson(report);
+                            });
+                          },
+                          /*immediate=*/false};
   functions["stop"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Stop()); },
                        /*immediate=*/true, /*cancels=*/true};
   functions["abort"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Abort()); },

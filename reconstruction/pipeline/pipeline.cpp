@@ -78,10 +78,10 @@ std::vector<Figure> MainFigures(const ReconstructResult& result, const SurfaceRe
                      "expected reprojection error of surface points, full size, median"});
   figures.push_back({"texture measured", fmt::format("{:.1f} %", 100 * result.coverage),
                      "share of the surface's area; the rest is filled and marked so"});
-  figures.push_back({"faces", fmt::format("{}", result.surface.faces.size()),
-                     surface ? (surface->topology.closed_manifold() ? "closed manifold"
-                                                                    : "not a closed manifold")
-                             : "mesh as given"});
+  figures.push_back(
+      {"faces", fmt::format("{}", result.surface.faces.size()),
+       surface ? (surface->topology.closed_manifold() ? "closed manifold" : "not a closed manifold")
+               : "mesh as given"});
   figures.push_back({"charts", fmt::format("{}", atlas.charts),
                      fmt::format("{:.1f} texels per mm, {:.0f} % of the atlas used",
                                  atlas.texels_per_mm, 100 * atlas.texel_usage)});
@@ -106,14 +106,13 @@ Status WritePoseFiles(const fs::path& folder, const Poses& poses, const PhotoSet
   return WriteColmap(folder, poses, photos);
 }
 
-Status WriteModelFiles(const fs::path& folder, const AtlasMesh& atlas,
-                       const TextureResult& texture, const Poses& poses) {
+Status WriteModelFiles(const fs::path& folder, const AtlasMesh& atlas, const TextureResult& texture,
+                       const Poses& poses) {
   SCAN_CHECK(WriteAtlasObj(folder / "atlas.obj", atlas, "albedo.png"));
   SCAN_CHECK(WritePicture(folder / "albedo.png", texture.albedo));
   SCAN_CHECK(WritePicture(folder / "provenance.png", AsStored(texture.provenance)));
   GlbOptions glb;
-  if (!poses.mountings.empty())
-    glb.table_from_model = poses.mountings.front().table_from_model;
+  if (!poses.mountings.empty()) glb.table_from_model = poses.mountings.front().table_from_model;
   return WriteGlb(folder / "model.glb", atlas, texture.albedo, glb);
 }
 
@@ -144,8 +143,7 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
   stopwatch.Lap("atlas");
   SCAN_TRY(const std::vector<Mask> masks, MakeMasks(result.photos, options.masks, progress, stop));
   stopwatch.Lap("masks");
-  SCAN_TRY(result.poses,
-           SolvePoses(result.surface, result.photos, masks, options, progress, stop));
+  SCAN_TRY(result.poses, SolvePoses(result.surface, result.photos, masks, options, progress, stop));
   result.poses.model = "surface.ply";
   SCAN_CHECK(WritePoseFiles(folder / "poses", result.poses, result.photos));
   result.views_accepted = static_cast<std::size_t>(

@@ -39,22 +39,25 @@ TEST_F(BadInput, MissingFiles) {
   ExpectRefused({"atlas", Path("none.ply"), "--out", Path("out")}, "none.ply");
   ExpectRefused({"pose", Path("none"), "--mesh", Path("none.ply"), "--out", Path("out")}, "none");
   ExpectRefused({"import", "--photos", Path("none"), "--out", Path("out")}, "none");
-  ExpectRefused({"reconstruct", Path("none"), "--mesh", Path("m.ply"), "--out", Path("out")}, "none");
+  ExpectRefused({"reconstruct", Path("none"), "--mesh", Path("m.ply"), "--out", Path("out")},
+                "none");
   ExpectRefused({"verify", Path("none")}, "none");
 }
 
 TEST_F(BadInput, TruncatedOrUnreadableFiles) {
   ExpectRefused({"surface", Write("a.nrrd", "NRRD0004\ntype: float\n"), "--out", Path("out")},
                 "a.nrrd");
-  ExpectRefused({"surface", Write("b.mha", "ObjectType = Image\nNDims = 3\nDimSize = 9 9 9\n"
-                                           "ElementSpacing = 1 1 1\nElementType = MET_UCHAR\n"
-                                           "ElementDataFile = LOCAL\nxx"),
+  ExpectRefused({"surface",
+                 Write("b.mha",
+                       "ObjectType = Image\nNDims = 3\nDimSize = 9 9 9\n"
+                       "ElementSpacing = 1 1 1\nElementType = MET_UCHAR\n"
+                       "ElementDataFile = LOCAL\nxx"),
                  "--out", Path("out")},
                 "b.mha");
   ExpectRefused({"surface", Write("c.txt", "words"), "--out", Path("out")}, "c.txt");
-  ExpectRefused({"atlas", Write("d.ply", "ply\nformat ascii 1.0\nelement vertex 3\n"), "--out",
-                 Path("out")},
-                "d.ply");
+  ExpectRefused(
+      {"atlas", Write("d.ply", "ply\nformat ascii 1.0\nelement vertex 3\n"), "--out", Path("out")},
+      "d.ply");
 }
 
 TEST_F(BadInput, MeshesWithoutFacesOrWithNan) {
@@ -86,19 +89,20 @@ TEST_F(BadInput, AMaskThatDoesNotMatchItsPhotograph) {
   cv::imwrite(Path("photos/a.png"), cv::Mat(24, 32, CV_8UC3, cv::Scalar(9, 9, 9)));
   cv::imwrite(Path("masks/a.png"), cv::Mat(24, 31, CV_8U, cv::Scalar(255)));
   ExpectRefused({"import", "--photos", Path("photos"), "--masks", Path("masks"), "--transforms",
-                 Write("t.json", "{\"fl_x\":100,\"fl_y\":100,\"cx\":16,\"cy\":12,\"w\":32,"
-                                 "\"h\":24,\"frames\":[{\"file_path\":\"photos/a.png\"}]}"),
+                 Write("t.json",
+                       "{\"fl_x\":100,\"fl_y\":100,\"cx\":16,\"cy\":12,\"w\":32,"
+                       "\"h\":24,\"frames\":[{\"file_path\":\"photos/a.png\"}]}"),
                  "--out", Path("out")},
                 "a.png");
 }
 
 TEST_F(BadInput, AStationFileWithAnUnknownKeyOrAValueOutOfRange) {
-  for (const std::string text : {"name = \"x\"\nspeed_of_light = 3\n",
-                                 "name = \"x\"\n[sim]\nspecimen = \"unicorn\"\n",
-                                 "[sim]\njpeg_quality = 1000\n", "[[[\n"}) {
-    const ProgramRun run =
-        RunProgram("scanstationd", {"--config", Write("station.toml", text), "--socket",
-                                    Path("s.sock"), "--page-port", "-1"});
+  for (const std::string text :
+       {"name = \"x\"\nspeed_of_light = 3\n", "name = \"x\"\n[sim]\nspecimen = \"unicorn\"\n",
+        "[sim]\njpeg_quality = 1000\n", "[[[\n"}) {
+    const ProgramRun run = RunProgram(
+        "scanstationd",
+        {"--config", Write("station.toml", text), "--socket", Path("s.sock"), "--page-port", "-1"});
     EXPECT_EQ(run.exit_code, 2) << text << run.err;
     EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
   }
