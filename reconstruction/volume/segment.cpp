@@ -149,16 +149,29 @@ void Grow(const Volume& volume, double grow_threshold, Segmentation& s) {
   s.specimen = Select(above, labelling, wanted);
 }
 
-// Cavities of the closed set, and of the voxels that the closing added those that seal them.
+// Grows `set` by `steps` voxels, each step within `allowed`.
+VoxelSet GrownWithin(VoxelSet set, const VoxelSet& allowed, int steps) {
+  for (int n = 0; n < steps; ++n) {
+    set = Dilated(set, 1);
+    for (std::size_t v = 0; v < set.inside.size(); ++v) set.inside[v] &= allowed.inside[v];
+  }
+  return set;
+}
+
+// Cavities of the set closed by ever larger cubes, each with the voxels that its closing took from
+// it or that seal it: only closed voxels next to a cavity, so that gaps between leg and body stay.
 void FillCavities(int closing_radius, Segmentation& s) {
-  const VoxelSet closed =
-      closing_radius > 0 ? Eroded(Dilated(s.specimen, closing_radius), closing_radius) : s.specimen;
-  const VoxelSet cavities = EnclosedCavities(closed);
-  const VoxelSet near = Dilated(cavities, closing_radius + 1);
-  s.filled = cavities;
-  for (std::size_t v = 0; v < closed.inside.size(); ++v) {
-    s.filled.inside[v] |= closed.inside[v] && near.inside[v] && !s.specimen.inside[v];
-    s.specimen.inside[v] |= s.filled.inside[v];
+  for (int radius = 0; radius <= closing_radius; ++radius) {
+    const VoxelSet closed = Eroded(Dilated(s.specimen, radius), radius);
+    const VoxelSet cavities = EnclosedCavities(closed);
+    VoxelSet open = closed;
+    for (std::size_t v = 0; v < open.inside.size(); ++v)
+      open.inside[v] = (open.inside[v] && !s.specimen.inside[v]) || cavities.inside[v];
+    const VoxelSet fill = radius > 0 ? GrownWithin(cavities, open, radius + 1) : cavities;
+    for (std::size_t v = 0; v < fill.inside.size(); ++v) {
+      s.filled.inside[v] |= fill.inside[v];
+      s.specimen.inside[v] |= fill.inside[v];
+    }
   }
   s.cavity_voxels = Count(s.filled);
 }
