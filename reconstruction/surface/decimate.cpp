@@ -18,6 +18,7 @@ namespace scan {
 namespace {
 
 constexpr std::size_t kDeviationSamples = 40000;
+constexpr double kLeastFaces = 16;  // of a component
 
 // Positions about the centre in units of the largest extent: the simplifier works in float.
 std::vector<float> UnitPositions(const TriangleMesh& mesh, const Eigen::Vector3d& centre,
@@ -81,6 +82,8 @@ Result<Decimation> Decimate(const TriangleMesh& mesh, const DecimateOptions& opt
   for (std::size_t n = 0; n + 2 < kept; n += 3)
     out.mesh.faces.push_back({simplified[n], simplified[n + 1], simplified[n + 2]});
   MakeManifold(out.mesh);
+  // Collapses that met have nipped off specks of a few faces.
+  DropSmallComponents(out.mesh, std::min(0.01, kLeastFaces / static_cast<double>(options.faces)));
   if (out.mesh.faces.empty() || !CheckTopology(out.mesh).closed_manifold())
     return Failed(
         fmt::format("the mesh cannot be reduced to {} faces and stay closed", options.faces),

@@ -18,7 +18,7 @@ struct SegmentOptions {
   std::optional<double> grow_threshold;  // below `threshold`: regions grow from the specimen to it
   bool drop_side_walls = true;           // what touches a side wall of the volume (tube, holder)
   int opening_radius = 1;  // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
-  int closing_radius = 1;  // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
+  int closing_radius = 2;       // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
   bool fill_cavities = true;
 };
 

@@ -31,7 +31,6 @@ struct Component {
   std::size_t voxels = 0;
   bool side_wall = false;  // touches a face of the volume other than the first and last slice
   bool any_wall = false;
-  std::size_t central = 0;  // voxels nearer to the volume's long axis than a quarter of its width
 };
 
 // label[v] = 0 outside, 1 + index into `components` inside; components in the order of their first
