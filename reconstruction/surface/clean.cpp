@@ -251,7 +251,7 @@ CleanReport MakeManifold(TriangleMesh& mesh) {
   return report;
 }
 
-std::size_t DropSmallComponents(TriangleMesh& mesh, double least_share) {
+std::size_t DropSmallComponents(TriangleMesh& mesh, double least_share, bool drop_cavities) {
   DisjointSets sets(mesh.vertices.size());
   for (const Face& f : mesh.faces) {
     sets.Join(f[0], f[1]);
@@ -268,7 +268,7 @@ std::size_t DropSmallComponents(TriangleMesh& mesh, double least_share) {
         (mesh.vertices[f[0]] - o).dot((mesh.vertices[f[1]] - o).cross(mesh.vertices[f[2]] - o));
   }
   const auto dropped = [&](std::uint32_t root) {
-    return volume[root] < 0 ||
+    return (drop_cavities && volume[root] < 0) ||
            static_cast<double>(faces[root]) < least_share * static_cast<double>(largest);
   };
   std::size_t count = 0;

@@ -22,9 +22,10 @@ struct CleanReport {
 // Thread contract: pure. Source: Gueziec, Taubin, Lazarus, Horn 2001 (cutting and stitching).
 CleanReport MakeManifold(TriangleMesh& mesh);
 
-// Removes connected components of less than `least_share` of the faces of the largest, and closed
-// ones that face inward (walls of cavities). Returns the number removed. Precondition: manifold.
-std::size_t DropSmallComponents(TriangleMesh& mesh, double least_share);
+// Removes connected components of less than `least_share` of the faces of the largest and, on
+// request, those that face inward (walls of cavities). Returns the number removed.
+// Precondition: manifold.
+std::size_t DropSmallComponents(TriangleMesh& mesh, double least_share, bool drop_cavities);
 
 // Low-pass smoothing that keeps the volume (positive and negative steps alternate); no vertex moves
 // farther than `limit_mm` from where it was.

@@ -83,7 +83,8 @@ Result<Decimation> Decimate(const TriangleMesh& mesh, const DecimateOptions& opt
     out.mesh.faces.push_back({simplified[n], simplified[n + 1], simplified[n + 2]});
   MakeManifold(out.mesh);
   // Collapses that met have nipped off specks of a few faces.
-  DropSmallComponents(out.mesh, std::min(0.01, kLeastFaces / static_cast<double>(options.faces)));
+  DropSmallComponents(out.mesh, std::min(0.01, kLeastFaces / static_cast<double>(options.faces)),
+                      false);
   if (out.mesh.faces.empty() || !CheckTopology(out.mesh).closed_manifold())
     return Failed(
         fmt::format("the mesh cannot be reduced to {} faces and stay closed", options.faces),

@@ -13,7 +13,8 @@ Result<SurfaceResult> ExtractSurface(const Volume& volume, const SurfaceOptions&
   if (stop.stop_requested()) return Cancelled("surface");
   at(0.4);
   out.clean = MakeManifold(out.mesh);
-  out.clean.small_components = DropSmallComponents(out.mesh, options.least_component_share);
+  out.clean.small_components =
+      DropSmallComponents(out.mesh, options.least_component_share, options.segment.fill_cavities);
   if (out.mesh.faces.empty())
     return Failed("no surface at the threshold", "surface", "give another --threshold");
   at(0.6);

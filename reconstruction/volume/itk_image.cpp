@@ -1,6 +1,7 @@
 #include "reconstruction/volume/itk_image.h"
 
 #include <fmt/format.h>
+#include <gdcmTrace.h>
 #include <itkGDCMImageIO.h>
 #include <itkGDCMSeriesFileNames.h>
 #include <itkImage.h>
@@ -17,6 +18,8 @@
 #include <algorithm>
 #include <fstream>
 #include <limits>
+
+#include "reconstruction/volume/whole_file.h"
 
 namespace scan {
 namespace {
@@ -45,6 +48,8 @@ itk::ImageIOBase::Pointer MakeIo(VolumeFormat format) {
 template <class Fn>
 auto Guarded(const fs::path& path, Fn&& fn) -> decltype(fn()) {
   itk::Object::SetGlobalWarningDisplay(false);
+  gdcm::Trace::WarningOff();
+  gdcm::Trace::ErrorOff();
   const auto unreadable = [&](std::string why) {
     std::replace(why.begin(), why.end(), '\n', ' ');
     return BadInput("cannot be read as a volume (" + why + ")", path.string(),
@@ -76,18 +81,6 @@ Status CheckMemory(double voxels, const fs::path& path) {
                   path.string(), "check the size in the header, or reduce the volume");
 }
 
-// The data of an uncompressed file cannot be larger than the file: a header that claims more would
-// be filled with zeros by some readers.
-Status CheckBytes(const itk::ImageIOBase& io, const fs::path& path, bool compressed) {
-  std::error_code code;
-  const auto bytes = fs::file_size(path, code);
-  if (code || compressed || static_cast<std::uintmax_t>(io.GetImageSizeInBytes()) <= bytes)
-    return {};
-  return BadInput(fmt::format("the file is truncated: {} bytes of {} are there", bytes,
-                              io.GetImageSizeInBytes()),
-                  path.string(), "copy it again");
-}
-
 std::string HeaderText(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string text(16384, '\0');
@@ -98,26 +91,60 @@ std::string HeaderText(const fs::path& path) {
 
 struct HeaderFacts {
   bool has_spacing = false;
-  bool own_bytes_raw = false;  // the data lie uncompressed in this very file
+  fs::path data;  // the one file of the data; empty: several files, or the reader checks itself
+  bool deflated = false;
+  std::uint64_t offset = 0;  // of the deflated data
 };
+
+HeaderFacts MetaImageFacts(const fs::path& path, std::string text) {
+  const std::size_t key = text.find("ElementDataFile");
+  text.resize(std::min(text.size(), key == std::string::npos ? text.size() : text.find('\n', key)));
+  HeaderFacts facts;
+  facts.has_spacing = text.find("ElementSpacing") != std::string::npos ||
+                      text.find("ElementSize") != std::string::npos;
+  if (key == std::string::npos) return facts;
+  facts.deflated = text.find("CompressedData = True") != std::string::npos;
+  const std::size_t equals = text.find('=', key);
+  std::string data = equals == std::string::npos ? "" : text.substr(equals + 1);
+  std::erase_if(data, [](char c) { return c == '\r'; });
+  data.erase(0, data.find_first_not_of(' '));
+  if (data == "LOCAL") {
+    facts.data = path;
+    facts.offset = text.size() + 1;
+  }
+  // A list or a pattern of several files is left to the reader.
+  if (fs::exists(path.parent_path() / data)) facts.data = path.parent_path() / data;
+  return facts;
+}
 
 HeaderFacts ReadHeaderFacts(const fs::path& path, VolumeFormat format) {
   std::string text = HeaderText(path);
   const auto has = [&](std::string_view word) { return text.find(word) != std::string::npos; };
   switch (format) {
     case VolumeFormat::metaimage:
-      text.resize(std::min(text.size(), text.find("ElementDataFile") + 60));
-      return {has("ElementSpacing") || has("ElementSize"),
-              has("LOCAL") && !has("CompressedData = True")};
-    case VolumeFormat::nrrd:
+      return MetaImageFacts(path, std::move(text));
+    case VolumeFormat::nrrd: {
       text.resize(std::min(text.size(), text.find("\n\n")));
-      return {(has("spacings:") || has("space directions:")) && !has("spacings: nan"),
-              has("encoding: raw") && !has("data file:") && !has("datafile:")};
+      const bool raw = has("encoding: raw") && !has("data file:") && !has("datafile:");
+      return {has("spacings:") || has("space directions:"), raw ? path : fs::path(), false, 0};
+    }
     case VolumeFormat::nifti:
-      return {true, path.extension() == ".nii"};
+      return {true, path.extension() == ".nii" ? path : fs::path(), false, 0};
     default:
       return {};
   }
+}
+
+// Some readers fill with zeros what a truncated file lacks: so its size is checked beforehand.
+Status CheckBytes(const itk::ImageIOBase& io, const fs::path& path, const HeaderFacts& facts) {
+  if (facts.data.empty()) return {};
+  const auto wanted = static_cast<std::uintmax_t>(io.GetImageSizeInBytes());
+  if (facts.deflated) return CheckDeflateWhole(facts.data, facts.offset, wanted);
+  std::error_code code;
+  const std::uintmax_t bytes = fs::file_size(facts.data, code);
+  if (code || wanted <= bytes) return {};
+  return BadInput(fmt::format("the file is truncated: {} bytes of {} are there", bytes, wanted),
+                  path.string(), "copy it again");
 }
 
 Volume CopyOut(const Image3& image) {
@@ -149,6 +176,8 @@ Status CheckDimensions(const itk::ImageIOBase& io, const fs::path& path) {
 Result<FileVolume> ReadVolumeFile(const fs::path& path, VolumeFormat format) {
   return Guarded(path, [&]() -> Result<FileVolume> {
     const HeaderFacts facts = ReadHeaderFacts(path, format);
+    if (format == VolumeFormat::tiff) SCAN_CHECK(CheckTiffWhole(path));
+    if (path.extension() == ".gz") SCAN_CHECK(CheckGzipWhole(path));
     auto io = MakeIo(format);
     if (!io->CanReadFile(path.c_str()))
       return BadInput("is not of the format its name says", path.string(),
@@ -157,7 +186,7 @@ Result<FileVolume> ReadVolumeFile(const fs::path& path, VolumeFormat format) {
     io->ReadImageInformation();
     SCAN_CHECK(CheckGrey(*io, path));
     SCAN_CHECK(CheckDimensions(*io, path));
-    SCAN_CHECK(CheckBytes(*io, path, !facts.own_bytes_raw));
+    SCAN_CHECK(CheckBytes(*io, path, facts));
     auto reader = itk::ImageFileReader<Image3>::New();
     reader->SetImageIO(io);
     reader->SetFileName(path.string());
@@ -172,6 +201,7 @@ Result<FileVolume> ReadSlices(const std::vector<fs::path>& slices, VolumeFormat 
   for (std::size_t k = 0; k < slices.size(); ++k) {
     const fs::path& path = slices[k];
     const Status done = Guarded(path, [&]() -> Status {
+      if (format == VolumeFormat::tiff) SCAN_CHECK(CheckTiffWhole(path));
       auto io = MakeIo(format);
       if (!io->CanReadFile(path.c_str()))
         return BadInput("is not of the format its name says", path.string(),

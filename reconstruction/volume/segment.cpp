@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "reconstruction/volume/threshold.h"
 
@@ -17,6 +18,12 @@ constexpr double kLeastShareOfAll = 0.05;
 // Of the best contrast at a plausible component's surface. Measured: ant in fluid 0.36, its bright
 // gut content alone 0.57, a shading of the fluid 0.18.
 constexpr double kLeastShareOfBestContrast = 0.45;
+// Below it there is no outside at all: the densest pieces of a bone that fills the volume have
+// 0.18.
+constexpr double kLeastContrast = 0.25;
+// Faces that the opening cut, of those of a cube of as many voxels: a specimen hangs on the wall by
+// a bridge; the noise of air at its own median, which runs through the volume, by everything.
+constexpr double kMostCutShare = 0.05;
 constexpr std::size_t kVoxelsToJudge = 2'000'000;
 
 VoxelSet Above(const Volume& volume, double threshold) {
@@ -203,6 +210,7 @@ void MeasureStep(const Volume& volume, const VoxelSet& set, LevelTried& level) {
   const std::ptrdiff_t strides[3] = {1, static_cast<std::ptrdiff_t>(set.size[0]),
                                      static_cast<std::ptrdiff_t>(set.size[0] * set.size[1])};
   double inner = 0, outer = 0, pairs = 0;
+  level.cut_faces = 0;
   for (std::size_t k = 0; k < set.size[2]; ++k)
     for (std::size_t j = 0; j < set.size[1]; ++j)
       for (std::size_t i = 0; i < set.size[0]; ++i) {
@@ -212,6 +220,7 @@ void MeasureStep(const Volume& volume, const VoxelSet& set, LevelTried& level) {
           if (at[a] < 2 || at[a] + 2 >= set.size[a]) continue;
           for (const std::ptrdiff_t s : {strides[a], -strides[a]}) {
             const std::uint8_t* p = &set.inside[v];
+            level.cut_faces += !p[s] && (&volume.grey[v])[s] >= level.threshold;
             if (p[s] || p[2 * s] || !p[-s]) continue;
             inner += (&volume.grey[v])[-s];
             outer += (&volume.grey[v])[2 * s];
@@ -236,7 +245,9 @@ LevelTried Judge(const Volume& volume, double threshold, double darkest,
     return static_cast<double>(s.voxels) / static_cast<double>(std::max<std::size_t>(of, 1));
   };
   level.plausible = share(s.voxels + s.small_voxels) >= kLeastShareOfRest &&
-                    share(s.voxels_above) >= kLeastShareOfAll && level.contrast > 0;
+                    share(s.voxels_above) >= kLeastShareOfAll && level.contrast >= kLeastContrast &&
+                    static_cast<double>(level.cut_faces) <=
+                        kMostCutShare * 6 * std::pow(static_cast<double>(s.voxels), 2.0 / 3);
   return level;
 }
 
@@ -246,11 +257,8 @@ struct Candidates {
   std::vector<LevelTried> tried;
 };
 
-// All levels, at the given opening. The noise of air at its own median runs through the whole
-// volume and reaches the walls; an opening would cut it into something that looks like a body.
 Status JudgeLevels(const std::vector<double>& levels, const SegmentOptions& options,
                    const ProgressFn& progress, const std::stop_token& stop, Candidates& c) {
-  c.tried.clear();
   for (const double level : levels) {
     if (stop.stop_requested()) return Cancelled("segmentation");
     Report(progress, "segment",
@@ -289,16 +297,10 @@ Result<Segmentation> TakeBestLevel(const Volume& volume, const SegmentOptions& o
   while (volume.voxels() / (factor * factor * factor) > kVoxelsToJudge) ++factor;
   Candidates c{
       factor > 1 ? Reduced(volume, factor) : volume, MeansAbout(volume, levels.front()).below, {}};
-  SegmentOptions judged = options;
-  judged.opening_radius = 0;
-  SCAN_CHECK(JudgeLevels(levels, judged, progress, stop, c));
-  if (!BestLevel(c.tried) && options.opening_radius > 0) {
-    judged.opening_radius = options.opening_radius;
-    SCAN_CHECK(JudgeLevels(levels, judged, progress, stop, c));
-  }
+  SCAN_CHECK(JudgeLevels(levels, options, progress, stop, c));
   Segmentation s;
   if (const LevelTried* best = BestLevel(c.tried)) {
-    s = TakeLargest(volume, MiddleOfStep(c, *best, judged), options.drop_side_walls,
+    s = TakeLargest(volume, MiddleOfStep(c, *best, options), options.drop_side_walls,
                     options.opening_radius);
   } else {
     s = TakeLargest(volume, OtsuLevels(volume, 1, 0).front(), false, 0);

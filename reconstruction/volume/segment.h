@@ -18,7 +18,7 @@ struct SegmentOptions {
   std::optional<double> grow_threshold;  // below `threshold`: regions grow from the specimen to it
   bool drop_side_walls = true;           // what touches a side wall of the volume (tube, holder)
   int opening_radius = 1;  // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
-  int closing_radius = 2;       // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
+  int closing_radius = 2;  // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
   bool fill_cavities = true;
 };
 
@@ -30,6 +30,7 @@ struct LevelTried {
   std::size_t largest = 0;      // of these in the largest component of the rest
   double inner = 0, outer = 0;  // mean grey a voxel inside and outside of that component's surface
   double contrast = 0;          // (inner - outer) / (inner - darkest class)
+  std::size_t cut_faces = 0;    // between that component and what is dropped
   bool plausible = false;
 };
 
@@ -54,9 +55,9 @@ struct Segmentation {
 //
 // Without a given threshold the candidates of OtsuLevels are judged: plausible is one whose largest
 // component away from the side walls outweighs the other such components (noise does not) and is a
-// twentieth of all that is above. Taken is the lowest plausible one whose contrast is at least
-// 0.45 of the best: the noise of air and the shading of a fluid have none, and a dense core does
-// not win over the softer hull around it. The
+// twentieth of all that is above, and hangs on the rest by no more than a bridge. Taken is the
+// lowest plausible one whose contrast is at least 0.45 of the best: the noise of air and the
+// shading of a fluid have none, and a dense core does not win over the softer hull around it. The
 // threshold is then the middle of that step. When none is plausible (the specimen fills the
 // volume) the first Otsu threshold is taken and nothing is dropped.
 // Opening: what survives it and touches a side wall claims the voxels nearer to it (along paths

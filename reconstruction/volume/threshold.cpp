@@ -7,14 +7,15 @@ namespace scan {
 namespace {
 
 constexpr std::size_t kBins = 1024;
+constexpr double kTail = 1e-4;
+constexpr int kPasses = 6;
 
 struct Histogram {
   double low = 0, width = 1;  // of the first bin's edge, of a bin
   std::vector<double> count = std::vector<double>(kBins, 0.0);
 };
 
-// Between the quantiles 0.0001 and 0.9999 of a first histogram, so that single hot voxels do not
-// stretch the bins; values beyond fall into the outer bins.
+// Values beyond fall into the outer bins, so that single hot voxels do not stretch the others.
 Histogram Fill(const Volume& volume, double low, double high) {
   Histogram h{low, (high - low) / kBins, std::vector<double>(kBins, 0.0)};
   for (const float g : volume.grey) {
@@ -75,8 +76,12 @@ std::vector<double> OtsuLevels(const Volume& volume, int depth, int tail) {
   if (!(*high > *low)) return {};
   const double total = static_cast<double>(volume.grey.size());
   Histogram h = Fill(volume, *low, *high);
-  const double q_low = Quantile(h, 1e-4, total), q_high = Quantile(h, 1 - 1e-4, total) + h.width;
-  if (q_high - q_low > 4 * h.width) h = Fill(volume, q_low, q_high);
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const double q_low = Quantile(h, kTail, total),
+                 q_high = Quantile(h, 1 - kTail, total) + h.width;
+    if (q_high - q_low > kBins / 4 * h.width) break;
+    h = Fill(volume, q_low, q_high);
+  }
   std::vector<std::size_t> bins;
   SplitRecursively(h, 0, kBins, depth, bins);
   std::sort(bins.begin(), bins.end());

@@ -73,7 +73,8 @@ TEST(DropSmallComponents, KeepsTheLargeOnesAndDropsInwardOnes) {
   AddTetrahedron(mesh, 4, 6, 5, 7);
   ASSERT_GT(SignedVolume(TriangleMesh{mesh.vertices, {mesh.faces.begin(), mesh.faces.begin() + 4}}),
             0);
-  EXPECT_EQ(DropSmallComponents(mesh, 0.0), 1u);
+  EXPECT_EQ(DropSmallComponents(mesh, 0.0, false), 0u);
+  EXPECT_EQ(DropSmallComponents(mesh, 0.0, true), 1u);
   EXPECT_EQ(mesh.faces.size(), 4u);
   EXPECT_GT(SignedVolume(mesh), 0);
 }

@@ -124,6 +124,21 @@ TEST(ExtractSurface, ThinCylinderSurvives) {
   EXPECT_NEAR(sum / count, 1.5, 0.1);
 }
 
+TEST(ExtractSurface, CavityIsFilledOrKept) {
+  SolidVolume shape;
+  const auto shell = [](const Vector3d& p) { return std::abs(p.norm() - 6.5) - 2; };
+  const Volume volume = MakeSolidVolume(shape, shell, Uniform);
+  SurfaceOptions options;
+  const SurfaceResult filled = Extract(volume, options);
+  EXPECT_EQ(filled.topology.components, 1u);
+  EXPECT_LT(std::abs(DeviationOf(filled.mesh, Sphere(8.5)).mean), 0.02 * 0.5);
+  options.segment.fill_cavities = false;
+  const SurfaceResult hollow = Extract(volume, options);
+  EXPECT_EQ(hollow.topology.components, 2u);
+  EXPECT_TRUE(hollow.topology.closed_manifold());
+  EXPECT_LT(std::abs(DeviationOf(hollow.mesh, shell).mean), 0.02 * 0.5);
+}
+
 TEST(ExtractSurface, MaterialAtTheBorderGivesAClosedMesh) {
   SolidVolume shape;
   shape.size = {20, 20, 20};
