@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# usage: boot.sh LAB RUN SUITE BIN   boots the guest of LAB (see build.sh) and runs SUITE there as root.
+# The guest sees this machine's files read-only with changes kept in its memory, and RUN as /out: what
+# the suite prints goes to RUN/log, the kernel's messages to RUN/dmesg and RUN/console. In the suite
+# $LAB_DIR is tests/lab and $LAB_BIN is BIN. A line '# limit: SECONDS' in the suite limits its time
+# (default 180). The exit status is the suite's; 124 when it ran out of time, 125 when the guest died.
+set -euo pipefail
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+lab=$1 run=$2 suite=$3 bin=$4
+limit=$(sed -n 's/^# limit: \([0-9]\+\).*/\1/p' "$suite" | head -n 1)
+rm -rf "$run"
+mkdir -p "$run"
+cp "$suite" "$run/suite.sh"
+cp "$here/guest/main" "$run/main"
+printf 'LAB_DIR=%q\nLAB_BIN=%q\n' "$here" "$bin" >"$run/environment"
+
+# The guest's processor is emulated: nothing here depends on what the host can virtualise.
+status=0
+timeout "${limit:-180}" qemu-system-x86_64 -M pc -accel tcg,thread=multi -cpu max -smp 2 -m 1024 \
+  -nodefaults -no-user-config -display none -no-reboot -serial "file:$run/console" -monitor none \
+  -kernel "$lab/vmlinux" -initrd "$lab/initrd.cpio" \
+  -fsdev local,id=r,path=/,security_model=none,readonly=on,multidevs=remap \
+  -device virtio-9p-pci,fsdev=r,mount_tag=hostroot \
+  -fsdev "local,id=o,path=$run,security_model=none" -device virtio-9p-pci,fsdev=o,mount_tag=hostout \
+  -object rng-random,id=rng0,filename=/dev/urandom -device virtio-rng-pci,rng=rng0 \
+  -append "console=ttyS0 panic=-1 mitigations=off nokaslr random.trust_cpu=on tsc=reliable quiet labmods=$lab/lib/modules" \
+  </dev/null >"$run/qemu.log" 2>&1 || status=$?
+[ "$status" -eq 124 ] && exit 124
+[ -f "$run/status" ] && exit "$(cat "$run/status")"
+exit 125
