@@ -46,6 +46,11 @@ Result<std::unique_ptr<Page>> Page::Start(int port, PageBackend backend) {
   httplib::Server& server = impl->server;
   server.new_task_queue = [] { return new httplib::ThreadPool(4); };
   server.set_payload_max_length(4096);
+  // Not the library's SO_REUSEPORT, which lets two daemons share one port, each seeing some calls.
+  server.set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  });
   server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
     // A page of another origin may neither read nor post: its Origin header gives it away.
     const bool foreign =
