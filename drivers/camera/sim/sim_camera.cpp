@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/base/rng.h"
-#include "drivers/camera/sim/encode_picture.h"
+#include "drivers/camera/encode_picture.h"
 
 namespace scan {
 namespace {

@@ -1,4 +1,4 @@
-#include "drivers/camera/sim/encode_picture.h"
+#include "drivers/camera/encode_picture.h"
 
 #include <jpeglib.h>
 

@@ -10,7 +10,8 @@
 namespace scan {
 
 // `format` jpg: baseline JPEG without chroma subsampling (4:4:4), which OpenCV's own encoder cannot
-// be asked for; png: without loss, fast. Precondition: CV_8UC3, BGR, not empty; quality 1 to 100.
+// be asked for; png: without loss, fast. Precondition: CV_8UC3 (png also CV_16UC3), BGR, not empty;
+// quality 1 to 100.
 // Errors: bad_input for another format; failed when the encoder fails. Thread contract: pure.
 Result<EncodedFile> EncodePicture(const cv::Mat& bgr, const std::string& format, int jpeg_quality);
 

@@ -1,0 +1,160 @@
+#include "drivers/camera/v4l2/jpeg_decode.h"
+
+#include <jerror.h>
+#include <jpeglib.h>
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "drivers/camera/encode_picture.h"
+
+namespace scan {
+namespace {
+
+struct JpegError {
+  jpeg_error_mgr manager;  // first: libjpeg hands out its address
+  std::jmp_buf jump;
+  char text[JMSG_LENGTH_MAX];
+};
+
+[[noreturn]] void OnError(j_common_ptr info) {
+  auto* error = reinterpret_cast<JpegError*>(info->err);
+  info->err->format_message(info, error->text);
+  std::longjmp(error->jump, 1);
+}
+
+// Damaged data are warnings to libjpeg; here they are errors. Stray bytes between segments are not
+// damage: many cameras leave padding there.
+void OnMessage(j_common_ptr info, int level) {
+  if (level < 0 && info->err->msg_code != JWRN_EXTRANEOUS_DATA) OnError(info);
+}
+
+struct JpegHead {
+  int w = 0, h = 0;
+  bool has_huffman_tables = false;
+};
+
+// A decoder between setjmp and longjmp: plain C, nothing here has a destructor.
+struct JpegDecoder {
+  jpeg_decompress_struct info;
+  JpegError error;
+};
+
+void Begin(JpegDecoder& decoder) {
+  decoder.info.err = jpeg_std_error(&decoder.error.manager);
+  decoder.error.manager.error_exit = OnError;
+  decoder.error.manager.emit_message = OnMessage;
+  decoder.error.text[0] = 0;
+}
+
+bool ReadHead(JpegDecoder& decoder, const unsigned char* bytes, std::size_t size, JpegHead* head) {
+  Begin(decoder);
+  if (setjmp(decoder.error.jump) != 0) {
+    jpeg_destroy_decompress(&decoder.info);
+    return false;
+  }
+  jpeg_create_decompress(&decoder.info);
+  jpeg_mem_src(&decoder.info, bytes, size);
+  jpeg_read_header(&decoder.info, TRUE);
+  head->w = static_cast<int>(decoder.info.image_width);
+  head->h = static_cast<int>(decoder.info.image_height);
+  head->has_huffman_tables = decoder.info.dc_huff_tbl_ptrs[0] != nullptr;
+  jpeg_destroy_decompress(&decoder.info);
+  return true;
+}
+
+bool ReadPixels(JpegDecoder& decoder, const unsigned char* bytes, std::size_t size,
+                unsigned char* bgr, std::size_t stride, std::size_t* used) {
+  Begin(decoder);
+  if (setjmp(decoder.error.jump) != 0) {
+    jpeg_destroy_decompress(&decoder.info);
+    return false;
+  }
+  jpeg_create_decompress(&decoder.info);
+  jpeg_mem_src(&decoder.info, bytes, size);
+  jpeg_read_header(&decoder.info, TRUE);
+  decoder.info.out_color_space = JCS_EXT_BGR;
+  jpeg_start_decompress(&decoder.info);
+  while (decoder.info.output_scanline < decoder.info.output_height) {
+    JSAMPROW row = bgr + stride * decoder.info.output_scanline;
+    jpeg_read_scanlines(&decoder.info, &row, 1);
+  }
+  jpeg_finish_decompress(&decoder.info);
+  *used = size - decoder.info.src->bytes_in_buffer;
+  jpeg_destroy_decompress(&decoder.info);
+  return true;
+}
+
+tl::unexpected<Error> Corrupt(const std::string& what) {
+  return DeviceFault("the camera sent a damaged JPEG: " + what, "camera",
+                     "check cable, hub and power supply; a lower frame rate may help");
+}
+
+const unsigned char* Uchar(std::span<const std::byte> bytes) {
+  return reinterpret_cast<const unsigned char*>(bytes.data());
+}
+
+Result<JpegHead> HeadOf(std::span<const std::byte> bytes) {
+  JpegDecoder decoder{};
+  JpegHead head;
+  if (bytes.size() < 4) return Corrupt("it is empty");
+  if (!ReadHead(decoder, Uchar(bytes), bytes.size(), &head)) return Corrupt(decoder.error.text);
+  if (head.w < 1 || head.h < 1 || head.w > 32768 || head.h > 32768)
+    return Corrupt("its size is absurd");
+  return head;
+}
+
+// The four standard tables (ITU-T T.81, Annex K), taken from a picture that libjpeg writes.
+Result<std::vector<std::byte>> StandardHuffmanTables() {
+  SCAN_TRY(const EncodedFile picture,
+           EncodePicture(cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(0)), "jpg", 90));
+  std::vector<std::byte> tables;
+  const auto& b = picture.bytes;
+  for (std::size_t at = 2; at + 4 <= b.size() && b[at] == std::byte{0xff};) {
+    const std::size_t length = 2 + (std::to_integer<std::size_t>(b[at + 2]) << 8) +
+                               std::to_integer<std::size_t>(b[at + 3]);
+    if (at + length > b.size() || b[at + 1] == std::byte{0xda}) break;
+    const auto from = b.begin() + static_cast<std::ptrdiff_t>(at);
+    if (b[at + 1] == std::byte{0xc4})
+      tables.insert(tables.end(), from, from + static_cast<std::ptrdiff_t>(length));
+    at += length;
+  }
+  return tables;
+}
+
+}  // namespace
+
+Result<cv::Mat> DecodeJpegStrictly(std::span<const std::byte> bytes, std::size_t* used) {
+  SCAN_TRY(const JpegHead head, HeadOf(bytes));
+  cv::Mat picture(head.h, head.w, CV_8UC3);
+  JpegDecoder decoder{};
+  std::size_t length = 0;
+  if (!ReadPixels(decoder, Uchar(bytes), bytes.size(), picture.data, picture.step, &length))
+    return Corrupt(decoder.error.text);
+  if (used) *used = length;
+  return picture;
+}
+
+Result<EncodedFile> JpegFileOf(std::span<const std::byte> bytes, int w, int h) {
+  SCAN_TRY(const JpegHead head, HeadOf(bytes));
+  if (head.w != w || head.h != h)
+    return Corrupt("it is " + std::to_string(head.w) + " x " + std::to_string(head.h) + ", not " +
+                   std::to_string(w) + " x " + std::to_string(h));
+  std::size_t length = 0;
+  SCAN_TRY(const cv::Mat decoded, DecodeJpegStrictly(bytes, &length));
+  bytes = bytes.first(length);
+  EncodedFile file{"jpg", {}};
+  file.bytes.reserve(bytes.size() + 512);
+  file.bytes.assign(bytes.begin(), bytes.begin() + 2);  // SOI
+  if (!head.has_huffman_tables) {
+    SCAN_TRY(const auto tables, StandardHuffmanTables());
+    file.bytes.insert(file.bytes.end(), tables.begin(), tables.end());
+  }
+  file.bytes.insert(file.bytes.end(), bytes.begin() + 2, bytes.end());
+  return file;
+}
+
+}  // namespace scan
