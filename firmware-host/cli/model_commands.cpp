@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
+#include <span>
 
 #include "drivers/base/files.h"
 #include "drivers/base/staged_folder.h"
 #include "firmware-host/cli/commands.h"
 #include "reconstruction/mesh/mesh_io.h"
 #include "reconstruction/pipeline/pipeline.h"
+#include "reconstruction/render/shade.h"
 
 namespace scan {
 namespace {
@@ -17,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ModelOptions {
-  fs::path session, volume, mesh, poses, out;
+  fs::path session, volume, mesh, poses, out, picture;
   bool force = false;
   std::vector<double> voxel_mm;
   double threshold = 0;
@@ -80,6 +82,21 @@ void AddOut(CLI::App& command, ModelOptions& options, const std::string& what) {
   command.add_flag("--force", options.force, "replace what is there");
 }
 
+void AddPicture(CLI::App& command, ModelOptions& options) {
+  command.add_option("--picture", options.picture, "PNG file to write: the result from two sides");
+}
+
+Status PreparePicture(const ModelOptions& options) {
+  return options.picture.empty() ? Status{} : PrepareOutputFile(options.picture, options.force);
+}
+
+Status WritePicture(const ModelOptions& options, const cv::Mat& picture) {
+  std::vector<std::uint8_t> png;
+  if (!cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 9}))
+    return Failed("the picture cannot be encoded", options.picture.string(), "give another name");
+  return WriteFileDurably(options.picture, std::as_bytes(std::span(png)));
+}
+
 Json TopologyJson(const TopologyReport& topology) {
   return {{"closed_manifold", topology.closed_manifold()},
           {"boundary_edges", topology.boundary_edges},
@@ -91,10 +108,12 @@ Json TopologyJson(const TopologyReport& topology) {
 Result<CommandOutput> RunSurface(ModelOptions& options, const CliContext& context) {
   SCAN_CHECK(Resolve(options));
   SCAN_CHECK(PrepareOutputFile(options.out, options.force));
+  SCAN_CHECK(PreparePicture(options));
   SCAN_TRY(const Volume volume, ReadVolume(options.volume, options.stages.volume));
   SCAN_TRY(const SurfaceResult surface,
            ExtractSurface(volume, options.stages.surface, context.progress, context.stop));
   SCAN_CHECK(WritePly(options.out, surface.mesh));
+  if (!options.picture.empty()) SCAN_CHECK(WritePicture(options, ShadedPicture(surface.mesh, {})));
   return CommandOutput{
       {{"surface", options.out.string()},
        {"vertices", surface.mesh.vertices.size()},
@@ -102,6 +121,8 @@ Result<CommandOutput> RunSurface(ModelOptions& options, const CliContext& contex
        {"threshold", surface.segmentation.threshold},
        {"area_mm2", SurfaceArea(surface.mesh)},
        {"volume_mm3", SignedVolume(surface.mesh)},
+       {"inner_voxels_filled", surface.segmentation.cavity_voxels},
+       {"specks_dropped", surface.segmentation.small_components + surface.specks},
        {"topology", TopologyJson(surface.topology)}},
       fmt::format("{} faces, {}, threshold {:.4g}: {}\n", surface.mesh.faces.size(),
                   surface.topology.closed_manifold() ? "closed manifold" : "not a closed manifold",
@@ -234,6 +255,7 @@ void AddSurface(CommandSet& commands) {
       AddModel(commands, "surface", "CT volume to a closed mesh", RunSurface, options);
   command.add_option("volume", options->volume, "volume file or folder of slices")->required();
   AddOut(command, *options, "PLY file to write");
+  AddPicture(command, *options);
   AddVolumeOptions(command, *options);
 }
 

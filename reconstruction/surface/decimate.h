@@ -21,8 +21,10 @@ struct Decimation {
 
 // Quadric edge collapse to about `faces` faces, made a closed manifold again; a mesh with no more
 // faces than that comes back as it is. Vertices stay where they were (a subset of the original's).
-// Precondition: closed manifold. Errors: failed when the result is no closed manifold.
-// Thread contract: pure. Source: Garland, Heckbert 1997 (meshoptimizer).
+// Where collapses meet in a thin place and pinch it off, the faces about it are kept and the rest
+// is reduced again: components and handles stay. Precondition: closed manifold. Errors: failed when
+// the result is no closed manifold. Thread contract: pure. Source: Garland, Heckbert 1997
+// (meshoptimizer).
 Result<Decimation> Decimate(const TriangleMesh& mesh, const DecimateOptions& options = {});
 
 }  // namespace scan

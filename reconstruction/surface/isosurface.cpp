@@ -64,14 +64,17 @@ Zones MakeZones(const Volume& volume, const Segmentation& s) {
   return z;
 }
 
+float StepOf(const Volume& volume, const Segmentation& s) {
+  const ClassMeans means = MeansAbout(volume, s.threshold);
+  return static_cast<float>(std::max(means.above - means.below, 1e-6));
+}
+
 class HalfWay {
  public:
   HalfWay(const Volume& volume, const Segmentation& s, const Zones& zones,
           const IsosurfaceOptions& options)
       : volume_(volume), zones_(zones), options_(options) {
-    const ClassMeans means = MeansAbout(volume, s.threshold);
-    fallback_ = {static_cast<float>(s.threshold),
-                 static_cast<float>(std::max(means.above - means.below, 1e-6))};
+    fallback_ = {static_cast<float>(s.threshold), StepOf(volume, s)};
   }
   const Levels& fallback() const { return fallback_; }
 
@@ -144,12 +147,53 @@ vtkNew<vtkImageData> MakeField(const Volume& volume, const Segmentation& s,
   return image;
 }
 
+// What the field has above zero besides its largest component becomes air, what the outside does
+// not reach becomes material: the field's own sign decides what leaks, voxels half-way in grey are
+// not where the segmentation's one threshold has them.
+void CloseInnerSpaces(const ExteriorOptions& exterior, float step, vtkImageData& image,
+                      ContouredSurface& report) {
+  const int* dimensions = image.GetDimensions();
+  float* field = static_cast<float*>(image.GetScalarPointer());
+  VoxelSet solid;
+  for (std::size_t a = 0; a < 3; ++a) solid.size[a] = static_cast<std::size_t>(dimensions[a]);
+  solid.inside.resize(solid.size[0] * solid.size[1] * solid.size[2]);
+  for (std::size_t v = 0; v < solid.inside.size(); ++v) solid.inside[v] = field[v] > 0;
+  const Labelling labelling = LabelComponents(solid, Connectivity::edges);
+  const std::ptrdiff_t largest = LargestOf(labelling);
+  for (std::size_t v = 0; v < solid.inside.size(); ++v)
+    if (solid.inside[v] && static_cast<std::ptrdiff_t>(labelling.label[v]) != largest + 1) {
+      solid.inside[v] = 0;
+      field[v] = -step;
+      ++report.speck_voxels;
+    }
+  report.specks =
+      labelling.components.size() - std::min<std::size_t>(1, labelling.components.size());
+  const VoxelSet inner = InnerSpaces(solid, exterior);
+  for (std::size_t v = 0; v < inner.inside.size(); ++v)
+    if (inner.inside[v]) field[v] = step;
+}
+
+// The contour filter separates what is above zero where it meets across the diagonal of a face
+// only; of -F that is the outside: a thin leg holds together at edges (18-connected solid).
+void Negate(vtkImageData& image) {
+  float* field = static_cast<float*>(image.GetScalarPointer());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, static_cast<std::size_t>(image.GetNumberOfPoints())),
+      [&](const auto& range) {
+        for (std::size_t v = range.begin(); v < range.end(); ++v) field[v] = -field[v];
+      });
+}
+
 }  // namespace
 
-TriangleMesh Isosurface(const Volume& volume, const Segmentation& segmentation,
-                        const IsosurfaceOptions& options) {
+ContouredSurface Isosurface(const Volume& volume, const Segmentation& segmentation,
+                            const IsosurfaceOptions& options) {
+  ContouredSurface out;
   const vtkNew<vtkImageData> field = MakeField(volume, segmentation, options);
+  if (segmentation.exterior)
+    CloseInnerSpaces(*segmentation.exterior, StepOf(volume, segmentation), *field, out);
   vtkNew<vtkFlyingEdges3D> contour;
+  Negate(*field);
   contour->SetInputData(field);
   contour->SetValue(0, 0.0);
   contour->ComputeNormalsOff();
@@ -158,7 +202,7 @@ TriangleMesh Isosurface(const Volume& volume, const Segmentation& segmentation,
   contour->Update();
   vtkPolyData* surface = contour->GetOutput();
 
-  TriangleMesh mesh;
+  TriangleMesh& mesh = out.mesh;
   const Eigen::Matrix3d model_from_index = volume.direction * volume.spacing_mm.asDiagonal();
   mesh.vertices.resize(static_cast<std::size_t>(surface->GetNumberOfPoints()));
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
@@ -167,7 +211,7 @@ TriangleMesh Isosurface(const Volume& volume, const Segmentation& segmentation,
     mesh.vertices[v] = volume.origin_mm + model_from_index * p;
   }
   mesh.faces.reserve(static_cast<std::size_t>(surface->GetNumberOfPolys()));
-  const bool mirrored = model_from_index.determinant() < 0;
+  const bool mirrored = model_from_index.determinant() > 0;  // of -F
   vtkCellArray* polys = surface->GetPolys();
   vtkIdType count = 0;
   const vtkIdType* ids = nullptr;
@@ -178,7 +222,7 @@ TriangleMesh Isosurface(const Volume& volume, const Segmentation& segmentation,
     if (mirrored) std::swap(face[1], face[2]);
     mesh.faces.push_back(face);
   }
-  return mesh;
+  return out;
 }
 
 }  // namespace scan

@@ -14,6 +14,12 @@ struct IsosurfaceOptions {
   int window_radius = 2;  // voxels, >= 1: how far "nearby" reaches
 };
 
+struct ContouredSurface {
+  TriangleMesh mesh;
+  std::size_t specks = 0;        // pieces above zero beside the largest, left out
+  std::size_t speck_voxels = 0;  // of these
+};
+
 // Closed surface of the segmented specimen in the model frame, mm; faces outward.
 //
 // Flying edges at the zero of F = grey - T. T(v) = (air(v) + material(v)) / 2, the half-way value
@@ -22,10 +28,12 @@ struct IsosurfaceOptions {
 // material. Where the window holds no such voxel (blades and legs of two voxels) the segmentation's
 // threshold stands. Voxels farther than one from the specimen's own, and those of dropped
 // components, are air; filled cavities and voxels deeper than two are material. One layer of air
-// around the volume closes the surface there half a voxel beyond the last centre. Precondition: the
+// around the volume closes the surface there half a voxel beyond the last centre. Where the
+// segmentation fills inner spaces, F's largest component is kept and what its outside does not
+// reach is filled: one piece, whose handles are those that InnerSpaces leaves. Precondition: the
 // segmentation is of this volume. Thread contract: pure; parallel inside, same bytes for any number
 // of threads. Source: Schroeder, Maynard, Geveci 2015 (flying edges).
-TriangleMesh Isosurface(const Volume& volume, const Segmentation& segmentation,
-                        const IsosurfaceOptions& options = {});
+ContouredSurface Isosurface(const Volume& volume, const Segmentation& segmentation,
+                            const IsosurfaceOptions& options = {});
 
 }  // namespace scan

@@ -9,7 +9,10 @@ Result<SurfaceResult> ExtractSurface(const Volume& volume, const SurfaceOptions&
   SCAN_TRY(out.segmentation, Segment(volume, options.segment, progress, stop));
   if (stop.stop_requested()) return Cancelled("surface");
   at(0.1);
-  out.mesh = Isosurface(volume, out.segmentation, options.isosurface);
+  ContouredSurface contoured = Isosurface(volume, out.segmentation, options.isosurface);
+  out.mesh = std::move(contoured.mesh);
+  out.specks = contoured.specks;
+  out.speck_voxels = contoured.speck_voxels;
   if (stop.stop_requested()) return Cancelled("surface");
   at(0.4);
   out.clean = MakeManifold(out.mesh);

@@ -25,7 +25,8 @@ struct SurfaceOptions {
 
 struct SurfaceResult {
   TriangleMesh mesh;
-  Segmentation segmentation;  // report and voxels
+  Segmentation segmentation;                 // report and voxels
+  std::size_t specks = 0, speck_voxels = 0;  // beside the largest piece, left out by Isosurface
   CleanReport clean;
   std::size_t faces_before_decimation = 0;
   double quadric_error_mm = 0, max_deviation_mm = 0, rms_deviation_mm = 0;  // of the decimation

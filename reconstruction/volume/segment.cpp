@@ -108,15 +108,6 @@ VoxelSet SideWallPart(const VoxelSet& above, const Labelling& labelling, int ope
   return NearerTo(touching, claimed, rest);
 }
 
-std::ptrdiff_t LargestOf(const Labelling& labelling) {
-  const auto& all = labelling.components;
-  if (all.empty()) return -1;
-  return std::max_element(
-             all.begin(), all.end(),
-             [](const Component& a, const Component& b) { return a.voxels < b.voxels; }) -
-         all.begin();
-}
-
 // The largest component above the threshold away from the side walls (or at all).
 Segmentation TakeLargest(const Volume& volume, double threshold, bool drop_side_walls,
                          int opening_radius) {
@@ -156,31 +147,12 @@ void Grow(const Volume& volume, double grow_threshold, Segmentation& s) {
   s.specimen = Select(above, labelling, wanted);
 }
 
-// Grows `set` by `steps` voxels, each step within `allowed`.
-VoxelSet GrownWithin(VoxelSet set, const VoxelSet& allowed, int steps) {
-  for (int n = 0; n < steps; ++n) {
-    set = Dilated(set, 1);
-    for (std::size_t v = 0; v < set.inside.size(); ++v) set.inside[v] &= allowed.inside[v];
-  }
-  return set;
-}
-
-// Cavities of the set closed by ever larger cubes, each with the voxels that its closing took from
-// it or that seal it: only closed voxels next to a cavity, so that gaps between leg and body stay.
-void FillCavities(int closing_radius, Segmentation& s) {
-  for (int radius = 0; radius <= closing_radius; ++radius) {
-    const VoxelSet closed = Eroded(Dilated(s.specimen, radius), radius);
-    const VoxelSet cavities = EnclosedCavities(closed);
-    VoxelSet open = closed;
-    for (std::size_t v = 0; v < open.inside.size(); ++v)
-      open.inside[v] = (open.inside[v] && !s.specimen.inside[v]) || cavities.inside[v];
-    const VoxelSet fill = radius > 0 ? GrownWithin(cavities, open, radius + 1) : cavities;
-    for (std::size_t v = 0; v < fill.inside.size(); ++v) {
-      s.filled.inside[v] |= fill.inside[v];
-      s.specimen.inside[v] |= fill.inside[v];
-    }
-  }
+void FillInnerSpaces(const ExteriorOptions& exterior, Segmentation& s) {
+  s.filled = InnerSpaces(s.specimen, exterior);
+  for (std::size_t v = 0; v < s.filled.inside.size(); ++v)
+    s.specimen.inside[v] |= s.filled.inside[v];
   s.cavity_voxels = Count(s.filled);
+  s.exterior = exterior;
 }
 
 // Means over cubes of `factor` voxels a side; what does not fill a cube at the far ends is left
@@ -330,7 +302,7 @@ Result<Segmentation> Segment(const Volume& volume, const SegmentOptions& options
   if (stop.stop_requested()) return Cancelled("segmentation");
   if (options.grow_threshold) Grow(volume, *options.grow_threshold, s);
   s.filled = VoxelSet{volume.size, std::vector<std::uint8_t>(volume.voxels())};
-  if (options.fill_cavities) FillCavities(options.closing_radius, s);
+  if (options.fill_cavities) FillInnerSpaces(options.exterior, s);
   s.voxels = Count(s.specimen);
   Report(progress, "segment", 1.0);
   return s;

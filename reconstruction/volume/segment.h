@@ -8,6 +8,7 @@
 
 #include "drivers/base/progress.h"
 #include "drivers/base/result.h"
+#include "reconstruction/volume/exterior.h"
 #include "reconstruction/volume/volume.h"
 #include "reconstruction/volume/voxel_set.h"
 
@@ -17,9 +18,9 @@ struct SegmentOptions {
   std::optional<double> threshold;       // grey value; empty: chosen among OtsuLevels
   std::optional<double> grow_threshold;  // below `threshold`: regions grow from the specimen to it
   bool drop_side_walls = true;           // what touches a side wall of the volume (tube, holder)
-  int opening_radius = 1;  // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
-  int closing_radius = 2;  // voxels, >= 0: leaks of a cavity up to 2 r wide count as closed
-  bool fill_cavities = true;
+  int opening_radius = 1;     // voxels, >= 0: bridges to the side walls up to 2 r wide are cut
+  bool fill_cavities = true;  // and all else that the outside does not reach
+  ExteriorOptions exterior;   // how it is told
 };
 
 // A candidate for the threshold, judged on the volume reduced to at most about two million voxels.
@@ -36,7 +37,8 @@ struct LevelTried {
 
 struct Segmentation {
   VoxelSet specimen;
-  VoxelSet filled;  // of these the voxels of filled cavities and their closed leaks
+  VoxelSet filled;  // of these the voxels of filled cavities and inner spaces
+  std::optional<ExteriorOptions> exterior;  // how they were told; empty: none is filled
   double threshold = 0;
   std::vector<LevelTried> levels;  // in ascending order; empty where the threshold was given
   std::size_t voxels_above = 0;    // all from the threshold on
@@ -51,7 +53,7 @@ struct Segmentation {
 };
 
 // The specimen's voxels: threshold, side walls dropped, region growing from the largest component,
-// cavities filled.
+// inner spaces filled (exterior.h).
 //
 // Without a given threshold the candidates of OtsuLevels are judged: plausible is one whose largest
 // component away from the side walls outweighs the other such components (noise does not) and is a

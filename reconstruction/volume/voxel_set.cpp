@@ -123,15 +123,16 @@ Labelling LabelComponents(const VoxelSet& set, Connectivity connectivity) {
   std::vector<std::uint32_t> parent(r.runs.size());
   std::iota(parent.begin(), parent.end(), 0u);
   const std::size_t h = set.size[1], d = set.size[2];
-  const bool corners = connectivity == Connectivity::corners;
-  const std::uint32_t reach = corners ? 1 : 0;
+  const bool edges = connectivity != Connectivity::faces;
+  const std::uint32_t reach = edges ? 1 : 0;
+  const std::uint32_t diagonal_reach = connectivity == Connectivity::corners ? 1 : 0;
   for (std::size_t k = 0; k < d; ++k)
     for (std::size_t j = 0; j < h; ++j) {
       const std::size_t row = j + h * k;
       if (j > 0) JoinRows(r, row, row - 1, reach, parent);
       if (k > 0) JoinRows(r, row, row - h, reach, parent);
-      if (corners && k > 0 && j > 0) JoinRows(r, row, row - h - 1, reach, parent);
-      if (corners && k > 0 && j + 1 < h) JoinRows(r, row, row - h + 1, reach, parent);
+      if (edges && k > 0 && j > 0) JoinRows(r, row, row - h - 1, diagonal_reach, parent);
+      if (edges && k > 0 && j + 1 < h) JoinRows(r, row, row - h + 1, diagonal_reach, parent);
     }
   Labelling out;
   out.label.assign(set.inside.size(), 0);
@@ -155,6 +156,15 @@ Labelling LabelComponents(const VoxelSet& set, Connectivity connectivity) {
     }
   }
   return out;
+}
+
+std::ptrdiff_t LargestOf(const Labelling& labelling) {
+  const auto& all = labelling.components;
+  if (all.empty()) return -1;
+  return std::max_element(
+             all.begin(), all.end(),
+             [](const Component& a, const Component& b) { return a.voxels < b.voxels; }) -
+         all.begin();
 }
 
 VoxelSet EnclosedCavities(const VoxelSet& set) {

@@ -25,7 +25,7 @@ std::size_t Count(const VoxelSet& set);
 VoxelSet Dilated(const VoxelSet& set, int radius);
 VoxelSet Eroded(const VoxelSet& set, int radius);
 
-enum class Connectivity { faces, corners };  // 6 or 26 neighbours
+enum class Connectivity { faces, edges, corners };  // 6, 18 or 26 neighbours
 
 struct Component {
   std::size_t voxels = 0;
@@ -40,6 +40,9 @@ struct Labelling {
   std::vector<Component> components;
 };
 Labelling LabelComponents(const VoxelSet& set, Connectivity connectivity);
+
+// Index of the component with the most voxels, the first of equals; -1 without any.
+std::ptrdiff_t LargestOf(const Labelling& labelling);
 
 // Voxels outside of `set` that no path of face neighbours outside of `set` joins to the border of
 // the volume.

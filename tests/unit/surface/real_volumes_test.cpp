@@ -59,6 +59,9 @@ TEST(RealVolumes, AntInItsTubeWithoutAThreshold) {
   const auto result = ExtractSurface(*volume);
   ASSERT_TRUE(result) << ToString(result.error());
   EXPECT_TRUE(result->topology.closed_manifold());
+  // One piece; with its inner spaces open to the outside it had 9 and an Euler number of -1260.
+  EXPECT_EQ(result->topology.components, 1u);
+  EXPECT_GE(result->topology.euler, -4);
   // The fluid is at 50 to 80, the cuticle from 100 on.
   EXPECT_GT(result->segmentation.threshold, 82);
   EXPECT_LT(result->segmentation.threshold, 105);
@@ -98,7 +101,7 @@ TEST(RealVolumes, ForamShell) {
   EXPECT_NEAR(Mean(*volume), 14.8052, 1e-3);
   SegmentOptions options;
   options.threshold = 80;
-  options.closing_radius = 0;
+  options.exterior.leak_radius = 0;
   const auto s = Segment(*volume, options);
   ASSERT_TRUE(s) << ToString(s.error());
   EXPECT_EQ(s->voxels_above, 383467u);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/base/rng.h"
 #include "tests/support/solid_volume.h"
 
 namespace scan {
@@ -139,6 +140,37 @@ TEST(ExtractSurface, CavityIsFilledOrKept) {
   EXPECT_LT(std::abs(DeviationOf(hollow.mesh, shell).mean), 0.02 * 0.5);
 }
 
+// Letting the outside into gaps and pores only ever cuts handles of what is closed at the leak's
+// scale: with the contour's own notion of what touches, to the last voxel.
+TEST(ExtractSurface, GapsAndPoresMakeNoHandles) {
+  Volume volume;
+  volume.size = {36, 36, 36};
+  Rng rng(11);
+  for (int k = 0; k < 36; ++k)
+    for (int j = 0; j < 36; ++j)
+      for (int i = 0; i < 36; ++i) {
+        const double r = Vector3d(i - 17.5, j - 17.5, k - 17.5).norm();
+        volume.grey.push_back(r < 14 && rng.Uniform() < 0.7 ? 1.0f : 0.0f);
+      }
+  const auto euler = [&](int leak_radius, int depth) {
+    SurfaceOptions options;
+    options.segment.threshold = 0.5;
+    options.segment.exterior = {leak_radius, depth};
+    options.isosurface.local_threshold = false;
+    options.smoothing_iterations = 0;
+    options.decimate.faces = 1000000;
+    const SurfaceResult r = Extract(volume, options);
+    EXPECT_TRUE(r.topology.closed_manifold());
+    EXPECT_EQ(r.topology.components, 1u);
+    return r.topology.euler;
+  };
+  EXPECT_LT(euler(0, 16), -60);
+  const std::ptrdiff_t closed = euler(2, 0);
+  EXPECT_GE(closed, -40);
+  EXPECT_GE(euler(2, 1), closed);
+  EXPECT_GE(euler(2, 16), closed);
+}
+
 TEST(ExtractSurface, MaterialAtTheBorderGivesAClosedMesh) {
   SolidVolume shape;
   shape.size = {20, 20, 20};
@@ -150,6 +182,28 @@ TEST(ExtractSurface, MaterialAtTheBorderGivesAClosedMesh) {
   EXPECT_TRUE(r.topology.closed_manifold());
   EXPECT_EQ(r.topology.euler, 2);
   EXPECT_NEAR(BoundsOf(r.mesh).high.z(), 5.0, 1e-6);  // half a voxel beyond the last centre
+}
+
+// Two bodies on a thread that the reduction would pinch off.
+TEST(Decimate, KeepsThinThreads) {
+  SolidVolume shape;
+  shape.size = {64, 40, 40};
+  shape.spacing_mm = Vector3d::Constant(1.0);
+  shape.blur_mm = 0.3;
+  const auto distance = [](const Vector3d& p) {
+    const double thread =
+        std::max(Eigen::Vector2d(p.y(), p.z()).norm() - 0.9, std::abs(p.x()) - 16);
+    const Vector3d apart(16, 0, 0);
+    return std::min({(p - apart).norm() - 12, (p + apart).norm() - 12, thread});
+  };
+  SurfaceOptions options;
+  options.decimate.faces = 300;
+  const SurfaceResult r = Extract(MakeSolidVolume(shape, distance, Uniform), options);
+  EXPECT_EQ(r.topology.components, 1u);
+  EXPECT_EQ(r.topology.euler, 2);
+  EXPECT_LT(r.mesh.faces.size(), 600u);
+  EXPECT_GT(BoundsOf(r.mesh).high.x(), 27);
+  EXPECT_LT(BoundsOf(r.mesh).low.x(), -27);
 }
 
 TEST(ExtractSurface, SameBytesForAnyNumberOfThreads) {

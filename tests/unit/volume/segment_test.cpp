@@ -90,16 +90,16 @@ TEST(Segment, EachStepCanBeSwitchedOff) {
   EXPECT_TRUE(tube.specimen.inside[tube.specimen.index(1, 28, 20)]);
 }
 
-TEST(Segment, LeakingCavityIsFilledUpToTheClosingRadius) {
+TEST(Segment, LeakingCavityIsFilledUpToTheLeakRadius) {
   Volume volume = InTube(10, 0);
   for (std::size_t k = 17; k < 25; ++k)
     for (std::size_t j = 21; j < 29; ++j)
       for (std::size_t i = 25; i < 33; ++i) volume.grey[volume.index(i, j, k)] = 10;
   for (std::size_t i = 25; i < 44; ++i) volume.grey[volume.index(i, 25, 20)] = 10;  // the leak
   SegmentOptions options;
-  options.closing_radius = 0;
+  options.exterior.leak_radius = 0;
   EXPECT_EQ(SegmentOrDie(volume, options).cavity_voxels, 0u);
-  options.closing_radius = 1;
+  options.exterior.leak_radius = 1;
   const Segmentation s = SegmentOrDie(volume, options);
   EXPECT_GE(s.cavity_voxels, 512u);
   EXPECT_LT(s.cavity_voxels, 530u);

@@ -87,6 +87,22 @@ TEST(VoxelSet, WallsAreTold) {
   EXPECT_TRUE(l.components[2].any_wall && l.components[2].side_wall);
 }
 
+TEST(VoxelSet, ComponentsByFacesEdgesAndCorners) {
+  VoxelSet set{{5, 5, 5}, std::vector<std::uint8_t>(125, 0)};
+  set.inside[set.index(0, 0, 0)] = 1;
+  set.inside[set.index(1, 0, 0)] = 1;  // a face
+  set.inside[set.index(2, 1, 0)] = 1;  // an edge within the slice
+  set.inside[set.index(2, 2, 1)] = 1;  // edges across slices
+  set.inside[set.index(3, 2, 2)] = 1;
+  set.inside[set.index(4, 3, 3)] = 1;  // a corner
+  EXPECT_EQ(LabelComponents(set, Connectivity::faces).components.size(), 5u);
+  const Labelling edges = LabelComponents(set, Connectivity::edges);
+  ASSERT_EQ(edges.components.size(), 2u);
+  EXPECT_EQ(LargestOf(edges), 0);
+  EXPECT_EQ(LabelComponents(set, Connectivity::corners).components.size(), 1u);
+  EXPECT_EQ(LargestOf(Labelling{}), -1);
+}
+
 TEST(VoxelSet, CavitiesAreClosedForFaceNeighbours) {
   VoxelSet shell{{7, 7, 7}, std::vector<std::uint8_t>(343, 0)};
   for (std::size_t k = 1; k < 6; ++k)
