@@ -19,6 +19,7 @@ void AddAllCommands(CommandSet& commands) {
   AddPose(commands);
   AddTexture(commands);
   AddReconstruct(commands);
+  AddEvaluate(commands);
 #endif
 }
 

@@ -28,4 +28,7 @@ void AddReconstruct(CommandSet& commands);
 // demo_command.cpp
 void AddDemo(CommandSet& commands);
 
+// evaluate_command.cpp
+void AddEvaluate(CommandSet& commands);
+
 }  // namespace scan

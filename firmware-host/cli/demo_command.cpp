@@ -2,19 +2,14 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <fstream>
 
-#include "drivers/base/files.h"
 #include "drivers/base/staged_folder.h"
 #include "drivers/base/units.h"
-#include "firmware-host/cli/child_process.h"
 #include "firmware-host/cli/commands.h"
-#include "firmware-host/cli/daemon_client.h"
+#include "firmware-host/cli/demo_capture.h"
 #include "firmware-host/cli/truth.h"
 #include "reconstruction/pipeline/pipeline.h"
 #include "reconstruction/specimens/specimen.h"
-#include "reconstruction/specimens/synthetic_ct.h"
-#include "reconstruction/volume/write_volume.h"
 
 namespace scan {
 namespace {
@@ -29,44 +24,8 @@ struct DemoOptions {
   bool force = false;
 };
 
-struct DemoPaths {
-  fs::path session, volume, model, truth, log, config;
-};
-
-DemoPaths PathsIn(const fs::path& folder) {
-  return {folder / "session",     folder / "ct.mha", folder / "model",
-          folder / "truth.jsonl", folder / "log",    folder / "station.toml"};
-}
-
 double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-// The default simulated station but for the specimen and its errors.
-Status WriteStationFile(const DemoOptions& options, const fs::path& path) {
-  return WriteFileDurably(path, fmt::format("name = \"demo\"\n\n[sim]\nspecimen = \"{}\"\n\n"
-                                            "[sim.errors]\nlevel = \"{}\"\n",
-                                            options.specimen, options.errors));
-}
-
-// The capture goes the way every capture goes: through a scanstationd of its own.
-Status CaptureDemo(const DemoPaths& paths, const CliContext& context) {
-  const fs::path socket =
-      fs::temp_directory_path() / fmt::format("scanstation-demo-{}.sock", ::getpid());
-  SCAN_TRY(const auto daemon,
-           ChildProcess::Start(ProgramFolder() / "scanstationd",
-                               {"--config", paths.config.string(), "--socket", socket.string(),
-                                "--page-port", "0", "--truth", paths.truth.string()},
-                               paths.log));
-  auto client = ConnectDaemon(socket, std::chrono::seconds(60));
-  if (!client) {
-    const auto log = ReadTextFile(paths.log);
-    return Failed("scanstationd did not start", log ? *log : paths.log.string(),
-                  "see its log " + paths.log.string());
-  }
-  SCAN_CHECK(CaptureAndFollow(**client, {{"out", paths.session.string()}}, context.progress,
-                              context.stop));
-  return {};
 }
 
 struct DemoScore {
@@ -138,16 +97,11 @@ CommandOutput MakeOutput(const DemoPaths& paths, const ReconstructResult& result
   return output;
 }
 
-Status MakeCtVolume(const DemoOptions& options, const DemoPaths& paths) {
-  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
-  return WriteVolume(paths.volume, SynthesiseCt(*specimen, CtOptions{}), {.compressed = false});
-}
-
 Result<CommandOutput> RunDemo(const DemoOptions& options, const CliContext& context) {
   ReconstructRequest request;
   if (options.method == "paper") request.options.method = PoseMethod::paper;
   SCAN_TRY(StagedFolder staged, StagedFolder::Create(options.out, options.force));
-  DemoPaths paths = PathsIn(staged.path());
+  DemoPaths paths = DemoPathsIn(staged.path());
   std::vector<StageSeconds> stages;
   auto start = std::chrono::steady_clock::now();
   const auto lap = [&](const std::string& stage) {
@@ -155,10 +109,9 @@ Result<CommandOutput> RunDemo(const DemoOptions& options, const CliContext& cont
     start = std::chrono::steady_clock::now();
   };
 
-  SCAN_CHECK(WriteStationFile(options, paths.config));
-  SCAN_CHECK(CaptureDemo(paths, context));
+  SCAN_CHECK(CaptureDemo(paths, options.specimen, options.errors, context));
   lap("capture");
-  SCAN_CHECK(MakeCtVolume(options, paths));
+  SCAN_CHECK(MakeDemoCt(paths, options.specimen));
   lap("CT volume");
   request.session = paths.session;
   request.volume = paths.volume;
@@ -170,7 +123,7 @@ Result<CommandOutput> RunDemo(const DemoOptions& options, const CliContext& cont
   lap("score");
 
   SCAN_CHECK(staged.Commit());
-  paths = PathsIn(staged.target());
+  paths = DemoPathsIn(staged.target());
   result.model = paths.model / "model.glb";
   result.report = paths.model / "report.html";
   return MakeOutput(paths, result, score, stages);

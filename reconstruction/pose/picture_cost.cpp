@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
@@ -9,13 +10,42 @@
 
 namespace scan {
 
+namespace {
+
+// Every vertex's pixel; NaN where it is not in front of the camera.
+std::vector<Eigen::Vector2f> ProjectAll(const TriangleMesh& mesh,
+                                        const CameraFromModel& camera_from_model,
+                                        const Intrinsics& in) {
+  const Eigen::Vector2f nowhere =
+      Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN());
+  const Eigen::Matrix3d rotation = camera_from_model.rotation();
+  const Eigen::Vector3d translation = camera_from_model.translation();
+  std::vector<Eigen::Vector2f> pixels(mesh.vertices.size(), nowhere);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const Eigen::Vector3d x = rotation * mesh.vertices[i] + translation;
+    if (in.has_distortion()) {
+      if (const auto pixel = Project(in, x)) pixels[i] = pixel->cast<float>();
+    } else if (x.z() > 0) {
+      const double inverse_z = 1 / x.z();
+      pixels[i] = {static_cast<float>(in.fl_x * x.x() * inverse_z + in.cx),
+                   static_cast<float>(in.fl_y * x.y() * inverse_z + in.cy)};
+    }
+  }
+  return pixels;
+}
+
+}  // namespace
+
 std::vector<cv::Point> BoundaryPixels(const cv::Mat& mask) {
   std::vector<cv::Point> boundary;
   for (int y = 0; y < mask.rows; ++y) {
     const uchar* row = mask.ptr<uchar>(y);
     const uchar* above = y > 0 ? mask.ptr<uchar>(y - 1) : nullptr;
     const uchar* below = y + 1 < mask.rows ? mask.ptr<uchar>(y + 1) : nullptr;
-    for (int x = 0; x < mask.cols; ++x) {
+    // Most rows of a picture are empty.
+    const void* found = std::memchr(row, 255, static_cast<std::size_t>(mask.cols));
+    if (!found) continue;
+    for (int x = static_cast<int>(static_cast<const uchar*>(found) - row); x < mask.cols; ++x) {
       if (!row[x]) continue;
       const bool at_edge = (x > 0 && !row[x - 1]) || (x + 1 < mask.cols && !row[x + 1]) ||
                            (above && !above[x]) || (below && !below[x]);
@@ -48,18 +78,8 @@ ReducedPicture ReducePicture(const Mask& mask, const Intrinsics& intrinsics, int
 
 cv::Mat RenderReduced(const TriangleMesh& mesh, const CameraFromModel& camera_from_model,
                       const Intrinsics& reduced) {
-  const float nowhere = std::numeric_limits<float>::quiet_NaN();
-  const Eigen::Matrix3d rotation = camera_from_model.rotation();
-  const Eigen::Vector3d translation = camera_from_model.translation();
-  std::vector<Eigen::Vector2f> pixels;
-  pixels.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3d& v : mesh.vertices) {
-    const auto pixel = Project(reduced, rotation * v + translation);
-    pixels.push_back(pixel ? Eigen::Vector2f(pixel->cast<float>())
-                           : Eigen::Vector2f(nowhere, nowhere));
-  }
   cv::Mat rendered(reduced.h, reduced.w, CV_8U, cv::Scalar(0));
-  FillTriangles(pixels, mesh.faces, rendered);
+  FillTriangles(ProjectAll(mesh, camera_from_model, reduced), mesh.faces, rendered);
   return rendered;
 }
 

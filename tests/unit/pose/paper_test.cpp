@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
 #include "drivers/base/units.h"
 #include "pose_scene.h"
 #include "reconstruction/pose/paper/paper_search.h"
@@ -41,6 +44,36 @@ TEST(Paper, CostOfTheTruePoseIsNothing) {
   const CameraFromModel off(ExpSo3({1.7, 0.2, 0.4}), Eigen::Vector3d(3, -2, 550));  // 5 px
   EXPECT_GT(CostOfPose(picture, mesh, off).l1_px, 1.0);
   EXPECT_GE(CostOfPose(picture, mesh, off).l1_px, CostOfPose(picture, mesh, off).l2_px);
+}
+
+// Eq 4 as it is written, nothing given up on the way.
+double PlainCost(const PaperTemplate& t, const ReducedPicture& picture, double angle) {
+  const cv::Moments m = cv::moments(picture.mask, true);
+  const Eigen::Vector2d target(m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5);
+  double sum = 0;
+  int count = 0;
+  for (const Eigen::Vector2f& p : t.boundary) {
+    const Eigen::Vector2d q = Eigen::Rotation2Dd(angle) * p.cast<double>() + target;
+    const cv::Point at(static_cast<int>(std::floor(q.x())), static_cast<int>(std::floor(q.y())));
+    if (!cv::Rect({0, 0}, picture.mask.size()).contains(at)) continue;
+    sum += picture.distance_l1.at<float>(at);
+    ++count;
+  }
+  return count > 0 ? sum / count : 1e9;
+}
+
+TEST(SearchTemplates, FindsTheLeastOfEq4AsAPlainSearchDoes) {
+  const TriangleMesh mesh = test::BugMesh(1);
+  const Eigen::Vector3d centre = MassCentre(mesh);
+  const CameraFromModel pose(ExpSo3({1.7, 0.2, 0.4}), Eigen::Vector3d(14, -9, 550));
+  const ReducedPicture picture = ReducePicture(test::RenderMask(mesh, pose, kReduced), kReduced);
+  const auto templates =
+      RenderTemplates(mesh, centre, IcosphereDirections(1), {540, 560}, kReduced);
+  double least = 1e9;
+  for (const PaperTemplate& t : templates)
+    for (int angle = 0; angle < 360; angle += 5)
+      least = std::min(least, PlainCost(t, picture, RadFromDeg(angle)));
+  EXPECT_NEAR(SearchTemplates(templates, picture, 5).cost_px, least, 0.02);
 }
 
 test::Scene PaperScene() {

@@ -1,0 +1,252 @@
+// Poses against a known truth: synthetic specimens, captures of the simulated station, calibrated
+// cameras.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include "drivers/base/staged_folder.h"
+#include "drivers/base/units.h"
+#include "firmware-host/cli/commands.h"
+#include "firmware-host/cli/demo_capture.h"
+#include "firmware-host/cli/truth.h"
+#include "reconstruction/evaluate/pose_trial.h"
+#include "reconstruction/masks/make_masks.h"
+#include "reconstruction/pipeline/pipeline.h"
+#include "reconstruction/specimens/specimen.h"
+#include "reconstruction/surface/decimate.h"
+
+namespace scan {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EvaluateOptions {
+  std::string what;
+  std::string specimen = "beetle";
+  std::string errors = "static";
+  std::string method = "both";
+  std::size_t views = 24;
+  double wrong_px = 5;
+  std::size_t paper_faces = 12000;
+  bool per_view = false;
+  fs::path out;
+  bool force = false;
+  PaperOptions paper;
+  JointOptions joint;
+
+  bool with_joint() const { return method != "paper"; }
+  bool with_paper() const { return method != "joint"; }
+};
+
+Json ToJson(const Spread& spread) {
+  return {{"median", spread.median}, {"p95", spread.p95}, {"max", spread.max}};
+}
+
+Json ToJson(const PoseError& error) {
+  return {{"centre_mm", error.centre_mm},
+          {"rotation_deg", DegFromRad(error.rotation_rad)},
+          {"surface_rms_px", error.surface_rms_px},
+          {"surface_median_px", error.surface_median_px}};
+}
+
+Json ToJson(const MethodFigures& figures, double wrong_px) {
+  const MethodSummary s = Summarise(figures, wrong_px);
+  Json free = Json::array();
+  for (const FreeDirection& f : figures.free_directions)
+    free.push_back({{"kind", f.kind == FreeDirection::Kind::rotation ? "rotation" : "translation"},
+                    {"of", f.of},
+                    {"axis", {f.axis.x(), f.axis.y(), f.axis.z()}}});
+  Json views = Json::array();
+  for (const ViewFigures& v : figures.views)
+    views.push_back({{"name", v.name},
+                     {"accepted", v.accepted},
+                     {"reason", v.reason},
+                     {"cost_px", v.cost_px},
+                     {"cost_l1_px", v.cost_l1_px},
+                     {"nees", v.nees},
+                     {"error", ToJson(v.error)},
+                     {"error_up_to_free_turn", ToJson(v.turned)}});
+  return {{"views", s.views},
+          {"accepted", s.accepted},
+          {"accepted_wrong", s.wrong},
+          {"wrong_px", wrong_px},
+          {"surface_rms_px", ToJson(s.surface_px)},
+          {"centre_mm", ToJson(s.centre_mm)},
+          {"rotation_deg", ToJson(s.rotation_deg)},
+          {"cost_px", ToJson(s.cost_px)},
+          {"centre_as_found_mm", ToJson(s.centre_raw_mm)},
+          {"surface_as_found_px", ToJson(s.surface_raw_px)},
+          {"mean_nees", s.mean_nees},
+          {"seconds", figures.seconds},
+          {"free_directions", free},
+          {"per_view", views}};
+}
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Joint first: what it reports free is taken off for both.
+Result<std::vector<MethodFigures>> RunMethods(const PoseTrial& trial,
+                                              const EvaluateOptions& options,
+                                              const CliContext& context) {
+  std::vector<MethodFigures> methods;
+  std::vector<FreeDirection> free;
+  const auto score = [&](const Result<Poses>& poses, double seconds) -> Status {
+    if (!poses) return tl::unexpected<Error>(poses.error());
+    if (poses->method == "joint") free = poses->free_directions;
+    methods.push_back(ScorePoses(trial, *poses, free));
+    methods.back().seconds = seconds;
+    return {};
+  };
+  auto start = std::chrono::steady_clock::now();
+  if (options.with_joint()) {
+    const auto poses = SolveJoint(trial.mesh, trial.photos, trial.masks, options.joint,
+                                  context.progress, context.stop);
+    SCAN_CHECK(score(poses, SecondsSince(start)));
+  }
+  start = std::chrono::steady_clock::now();
+  if (options.with_paper()) {
+    TriangleMesh mesh = trial.mesh;
+    if (options.paper_faces > 0) {
+      SCAN_TRY(Decimation fewer, Decimate(mesh, {.faces = options.paper_faces}));
+      mesh = std::move(fewer.mesh);
+    }
+    const auto poses =
+        SolvePaper(mesh, trial.photos, trial.masks, options.paper, context.progress, context.stop);
+    SCAN_CHECK(score(poses, SecondsSince(start)));
+  }
+  return methods;
+}
+
+// A folder that `scanstation demo` or `evaluate poses --out` wrote, its truth beside the session.
+Result<PoseTrial> TrialOf(const DemoPaths& paths, const EvaluateOptions& options,
+                          const CliContext& context) {
+  PoseTrial trial;
+  SCAN_TRY(trial.photos, LoadPhotoSet(paths.session));
+  SCAN_TRY(trial.truth, ReadTruth(paths.truth, paths.session, trial.photos));
+  const auto indices = EvenlySpread(trial.photos.photos.size(), options.views);
+  trial.masks.resize(trial.photos.photos.size());
+  trial = Subset(trial, indices);
+  SCAN_TRY(trial.masks, MakeMasks(trial.photos, {}, context.progress, context.stop));
+  SCAN_TRY(const Volume volume, ReadVolume(paths.volume, {}));
+  SCAN_TRY(SurfaceResult surface, ExtractSurface(volume, {}, context.progress, context.stop));
+  trial.mesh = std::move(surface.mesh);
+  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
+  trial.surface = ExactSurface(*specimen, 0.3);
+  return trial;
+}
+
+// A folder of its own that is removed at the end.
+class ScratchFolder {
+ public:
+  ScratchFolder()
+      : path_(fs::temp_directory_path() / fmt::format("scanstation-evaluate-{}", ::getpid())) {
+    fs::create_directories(path_);
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+Result<PoseTrial> CapturedTrial(const fs::path& folder, const EvaluateOptions& options,
+                                const CliContext& context) {
+  const DemoPaths paths = DemoPathsIn(folder);
+  SCAN_CHECK(CaptureDemo(paths, options.specimen, options.errors, context));
+  SCAN_CHECK(MakeDemoCt(paths, options.specimen));
+  return TrialOf(paths, options, context);
+}
+
+Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& context) {
+  if (options.out.empty()) {
+    const ScratchFolder scratch;
+    return CapturedTrial(scratch.path(), options, context);
+  }
+  SCAN_TRY(StagedFolder staged, StagedFolder::Create(options.out, options.force));
+  SCAN_TRY(PoseTrial trial, CapturedTrial(staged.path(), options, context));
+  SCAN_CHECK(staged.Commit());
+  return trial;
+}
+
+std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial) {
+  const Intrinsics& in = trial.photos.intrinsics(trial.photos.photos.front());
+  std::string text =
+      fmt::format("{}: {} photographs of {} x {}, simulated station, {} errors\n", options.specimen,
+                  trial.photos.photos.size(), in.w, in.h, options.errors);
+  if (options.with_paper())
+    text += fmt::format(
+        "paper: {} directions x {} distances x {} angles, {} chains x {} steps, gate {}, mesh of "
+        "{}\n",
+        10 * (1 << (2 * options.paper.subdivisions)) + 2, options.paper.distance_offsets_mm.size(),
+        360 / options.paper.angle_step_deg, options.paper.chains, options.paper.hill_steps,
+        options.paper.gate_px,
+        options.paper_faces > 0 ? fmt::format("{} faces", options.paper_faces) : "all faces");
+  return text;
+}
+
+Result<CommandOutput> RunEvaluate(const EvaluateOptions& options, const CliContext& context) {
+  SCAN_TRY(const PoseTrial trial, MakeTrial(options, context));
+  SCAN_TRY(const auto methods, RunMethods(trial, options, context));
+  Json by_method = Json::object();
+  for (const MethodFigures& method : methods)
+    by_method[method.method] = ToJson(method, options.wrong_px);
+  return CommandOutput{
+      {{"specimen", options.specimen},
+       {"errors", options.errors},
+       {"photographs", trial.photos.photos.size()},
+       {"methods", by_method}},
+      ProtocolText(options, trial) + TableOf(methods, options.wrong_px, options.per_view)};
+}
+
+}  // namespace
+
+void AddEvaluate(CommandSet& commands) {
+  auto options = std::make_shared<EvaluateOptions>();
+  CLI::App& command =
+      commands.Add("evaluate", "Poses against a known truth",
+                   [options](const CliContext& context) { return RunEvaluate(*options, context); });
+  command.add_option("what", options->what, "poses: capture a synthetic specimen and solve it")
+      ->required()
+      ->check(CLI::IsMember({"poses"}));
+  command.add_option("--specimen", options->specimen)
+      ->check(CLI::IsMember(SpecimenNames()))
+      ->capture_default_str();
+  command.add_option("--errors", options->errors, "of the simulated rig")
+      ->check(CLI::IsMember({"ideal", "static", "dynamic"}))
+      ->capture_default_str();
+  command.add_option("--method", options->method, "on the same photographs")
+      ->check(CLI::IsMember({"joint", "paper", "both"}))
+      ->capture_default_str();
+  command.add_option("--views", options->views, "photographs used, evenly spread over the capture")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--wrong-px", options->wrong_px, "surface error that makes a pose wrong")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_option("--chains", options->paper.chains, "of the paper's hill climbing")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  command.add_option("--hill-steps", options->paper.hill_steps, "of each chain")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command
+      .add_option("--paper-faces", options->paper_faces,
+                  "the paper's method gets the mesh decimated to this, for its thousands of "
+                  "pictures; 0: as it is")
+      ->capture_default_str();
+  command.add_flag("--per-view", options->per_view, "one line a view");
+  command.add_option("--out", options->out, "keep session, truth and CT volume in this folder");
+  command.add_flag("--force", options->force, "replace the folder");
+}
+
+}  // namespace scan
