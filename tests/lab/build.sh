@@ -16,7 +16,11 @@ find_kernel() {
   apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/.*Depends: linux-image-//p' | head -n 1
 }
 kernel=$(find_kernel)
-[ -n "$kernel" ] || die "no linux-image-amd64 in the package lists; run apt-get update and try again"
+if [ -z "$kernel" ]; then # package lists are often left out of images
+  if [ "$(id -u)" -eq 0 ]; then apt-get -qq update || true; else sudo apt-get -qq update || true; fi
+  kernel=$(find_kernel)
+fi
+[ -n "$kernel" ] || die "no linux-image-amd64 in the package lists: enable Debian's main archive, run apt-get update, try again"
 version=$(apt-cache show "linux-image-$kernel" | sed -n 's/^Version: //p' | head -n 1)
 scripts=$(cat "$here/build.sh" "$here/guest/init" "$here/dummy_hcd_iso.py" | sha256sum | cut -c1-8)
 lab=$cache/$kernel-$version-$scripts
