@@ -9,6 +9,7 @@
 #include "drivers/base/files.h"
 #include "drivers/base/staged_folder.h"
 #include "firmware-host/cli/commands.h"
+#include "reconstruction/atlas/chart_picture.h"
 #include "reconstruction/mesh/mesh_io.h"
 #include "reconstruction/pipeline/pipeline.h"
 #include "reconstruction/render/shade.h"
@@ -132,17 +133,24 @@ Result<CommandOutput> RunSurface(ModelOptions& options, const CliContext& contex
 Result<CommandOutput> RunAtlas(ModelOptions& options, const CliContext& context) {
   SCAN_CHECK(Resolve(options));
   SCAN_CHECK(PrepareOutputFile(options.out, options.force));
+  SCAN_CHECK(PreparePicture(options));
   SCAN_TRY(const TriangleMesh mesh, ReadMesh(options.mesh));
   SCAN_TRY(const AtlasResult atlas,
            MakeAtlas(mesh, options.stages.atlas, context.progress, context.stop));
   SCAN_CHECK(WriteAtlasObj(options.out, atlas.atlas, ""));
+  if (!options.picture.empty()) SCAN_CHECK(WritePicture(options, ChartPicture(atlas.atlas)));
   const AtlasReport& report = atlas.report;
   return CommandOutput{
       {{"atlas", options.out.string()},
        {"charts", report.charts},
        {"texels_per_mm", report.texels_per_mm},
        {"stretch_l2", report.stretch_l2},
-       {"texel_usage", report.texel_usage}},
+       {"stretch_median", report.stretch_median},
+       {"stretch_p95", report.stretch_p95},
+       {"stretch_p99", report.stretch_p99},
+       {"texel_usage", report.texel_usage},
+       {"padding_usage", report.padding_usage},
+       {"seam_length_mm", report.seam_length_mm}},
       fmt::format("{} charts, L2 stretch {:.3f}, {:.0f} % of the atlas used: {}\n", report.charts,
                   report.stretch_l2, 100 * report.texel_usage, options.out.string())};
 }
@@ -265,6 +273,7 @@ void AddAtlas(CommandSet& commands) {
       AddModel(commands, "atlas", "Mesh to a mesh with texture coordinates", RunAtlas, options);
   command.add_option("mesh", options->mesh, "PLY or OBJ file")->required();
   AddOut(command, *options, "OBJ file to write");
+  AddPicture(command, *options);
   AddAtlasOptions(command, *options);
 }
 

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 #include "reconstruction/atlas/chart_growth.h"
+#include "reconstruction/atlas/chart_merge.h"
 #include "reconstruction/atlas/chart_mesh.h"
 #include "reconstruction/atlas/chart_quality.h"
 #include "reconstruction/atlas/pack.h"
+#include "reconstruction/atlas/relax.h"
 #include "reconstruction/atlas/unfold.h"
 
 namespace scan {
@@ -19,6 +22,9 @@ constexpr std::uint32_t kNone = ~0u;
 constexpr double kStretchQuantile = 0.01;  // the worst percent of a chart's area
 
 constexpr double kMostWasted = 0.02;
+// Of the surface: what a chart may stretch at will, pits that no photograph shows.
+constexpr double kSlackShare = 5e-5;
+constexpr int kRelaxRounds = 8;
 
 using FaceSet = std::vector<std::uint32_t>;
 
@@ -37,19 +43,33 @@ Status CheckRequest(const TriangleMesh& mesh, const AtlasOptions& options) {
   return {};
 }
 
-// True when the chart is unfolded without fault.
-bool UnfoldWell(ChartMesh& chart, const AtlasOptions& options) {
-  if (!Unfold(chart, options.method)) {
-    if (!chart.disk || chart.faces.size() > 8) return false;
-    ProjectToPlane(chart);
-  }
+// Whether the chart's uv may be used; brought to the area of the surface.
+bool IsGood(ChartMesh& chart, const AtlasOptions& options, double slack_mm2) {
   if (CountFlipped(chart) > 0) {
     Untangle(chart);
     if (CountFlipped(chart) > 0) return false;
   }
   if (!ScaleToTrueArea(chart) || BorderCrosses(chart)) return false;
-  if (WastedShare(chart, options.max_stretch) > kMostWasted) return false;
-  return StretchQuantile(StretchOf(chart), kStretchQuantile) <= options.max_stretch;
+  const double slack = slack_mm2 / SurfaceArea(chart.mesh);
+  if (WastedShare(chart, options.max_stretch) > std::max(kMostWasted, slack)) return false;
+  return StretchQuantile(StretchOf(chart), std::max(kStretchQuantile, slack)) <=
+         options.max_stretch;
+}
+
+// True when the chart is unfolded without fault.
+bool UnfoldWell(ChartMesh& chart, const AtlasOptions& options, double slack_mm2) {
+  if (!Unfold(chart, options.method)) {
+    if (!chart.disk || chart.faces.size() > 8) return false;
+    ProjectToPlane(chart);
+  }
+  return IsGood(chart, options, slack_mm2);
+}
+
+// A conformal map trades size for angles without bound: where it fails, one nearer to an isometry
+// may do. Not before charts are halved, which mends with less stretch what bends at one place.
+bool UnfoldOrRelax(ChartMesh& chart, const AtlasOptions& options, double slack_mm2) {
+  if (UnfoldWell(chart, options, slack_mm2)) return true;
+  return !chart.uv.empty() && Relax(chart, kRelaxRounds) && IsGood(chart, options, slack_mm2);
 }
 
 // A single face always unfolds: its own shape.
@@ -58,10 +78,15 @@ void UnfoldFace(ChartMesh& chart) {
   ScaleToTrueArea(chart);
 }
 
+double SlackOf(const SurfaceGraph& graph) {
+  return kSlackShare * std::accumulate(graph.area.begin(), graph.area.end(), 0.0);
+}
+
 // Unfolds all charts, halving those that fail until they do not.
 Result<std::vector<ChartMesh>> UnfoldAll(const TriangleMesh& mesh, const SurfaceGraph& graph,
                                          std::vector<FaceSet> pending, const AtlasOptions& options,
                                          const ProgressFn& progress, const std::stop_token& stop) {
+  const double slack_mm2 = SlackOf(graph);
   std::vector<ChartMesh> done;
   std::size_t faces_done = 0;
   while (!pending.empty()) {
@@ -73,7 +98,7 @@ Result<std::vector<ChartMesh>> UnfoldAll(const TriangleMesh& mesh, const Surface
     tbb::parallel_for(std::size_t{0}, pending.size(), [&](std::size_t c) {
       if (stop.stop_requested()) return;
       tried[c] = MakeChartMesh(mesh, graph, pending[c]);
-      good[c] = UnfoldWell(tried[c], options);
+      good[c] = UnfoldWell(tried[c], options, slack_mm2);
       if (!good[c] && pending[c].size() == 1) {
         UnfoldFace(tried[c]);
         good[c] = 1;
@@ -91,9 +116,6 @@ Result<std::vector<ChartMesh>> UnfoldAll(const TriangleMesh& mesh, const Surface
     }
     pending = std::move(next);
   }
-  std::sort(done.begin(), done.end(), [](const ChartMesh& a, const ChartMesh& b) {
-    return a.faces.front() < b.faces.front();
-  });
   return done;
 }
 
@@ -164,6 +186,8 @@ AtlasReport Measure(const TriangleMesh& mesh, const SurfaceGraph& graph,
     all.insert(all.end(), stretch.begin(), stretch.end());
   }
   report.stretch_l2 = std::sqrt(sum / area);
+  report.stretch_median = StretchQuantile(all, 0.5);
+  report.stretch_p95 = StretchQuantile(all, 0.05);
   report.stretch_p99 = StretchQuantile(std::move(all), kStretchQuantile);
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -178,6 +202,13 @@ AtlasReport Measure(const TriangleMesh& mesh, const SurfaceGraph& graph,
   return report;
 }
 
+double BorderLength(const std::vector<ChartMesh>& charts) {
+  double length = 0;
+  for (const ChartMesh& chart : charts)
+    for (const auto& [from, to] : chart.border) length += (chart.uv[from] - chart.uv[to]).norm();
+  return length;
+}
+
 }  // namespace
 
 Result<AtlasResult> MakeAtlas(const TriangleMesh& mesh, const AtlasOptions& options,
@@ -188,6 +219,12 @@ Result<AtlasResult> MakeAtlas(const TriangleMesh& mesh, const AtlasOptions& opti
     return BadInput("mesh has no face with an area", "mesh", "give a surface mesh");
   SCAN_TRY(auto face_sets, GrowCharts(mesh, graph, progress, stop));
   SCAN_TRY(auto charts, UnfoldAll(mesh, graph, std::move(face_sets), options, progress, stop));
+  const double slack_mm2 = SlackOf(graph);
+  const auto unfold = [&](ChartMesh& chart) { return UnfoldOrRelax(chart, options, slack_mm2); };
+  SCAN_CHECK(MergeSmallCharts(mesh, graph, unfold, charts, progress, stop));
+  std::sort(charts.begin(), charts.end(), [](const ChartMesh& a, const ChartMesh& b) {
+    return a.faces.front() < b.faces.front();
+  });
   std::vector<ChartMesh> in_mm = charts;
   SCAN_TRY(const double texels_per_mm,
            PackCharts(charts, {options.size_px, options.padding_px}, progress, stop));
@@ -198,6 +235,8 @@ Result<AtlasResult> MakeAtlas(const TriangleMesh& mesh, const AtlasOptions& opti
   const double texels = static_cast<double>(options.size_px) * options.size_px;
   double area_mm2 = 0;
   for (const double area : graph.area) area_mm2 += area;
+  result.report.padding_usage =
+      BorderLength(in_mm) * texels_per_mm * 0.5 * options.padding_px / texels;
   result.report.texel_usage = area_mm2 * texels_per_mm * texels_per_mm / texels;
   Report(progress, "pack", 1);
   return result;
