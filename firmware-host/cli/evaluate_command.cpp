@@ -11,7 +11,9 @@
 #include "drivers/base/units.h"
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/cli/demo_capture.h"
+#include "firmware-host/cli/evaluate_model.h"
 #include "firmware-host/cli/truth.h"
+#include "reconstruction/evaluate/fig12.h"
 #include "reconstruction/evaluate/pose_trial.h"
 #include "reconstruction/masks/make_masks.h"
 #include "reconstruction/pipeline/pipeline.h"
@@ -25,18 +27,23 @@ namespace fs = std::filesystem;
 
 struct EvaluateOptions {
   std::string what;
+  std::string preset = "demo";
   std::string specimen = "beetle";
   std::string errors = "static";
   std::string method = "both";
-  std::size_t views = 24;
+  std::size_t views = 0;  // 0: the preset's
+  bool full_size = false;
+  Fig12Options fig12;
   double wrong_px = 5;
   std::size_t paper_faces = 12000;
   bool per_view = false;
   fs::path out;
   bool force = false;
+  EvaluateModelOptions model;
   PaperOptions paper;
   JointOptions joint;
 
+  bool is_fig12() const { return preset == "fig12"; }
   bool with_joint() const { return method != "paper"; }
   bool with_paper() const { return method != "joint"; }
 };
@@ -104,8 +111,10 @@ Result<std::vector<MethodFigures>> RunMethods(const PoseTrial& trial,
   };
   auto start = std::chrono::steady_clock::now();
   if (options.with_joint()) {
-    const auto poses = SolveJoint(trial.mesh, trial.photos, trial.masks, options.joint,
-                                  context.progress, context.stop);
+    const auto poses = options.is_fig12()
+                           ? SolveEachAlone(trial, options.joint, context.progress, context.stop)
+                           : SolveJoint(trial.mesh, trial.photos, trial.masks, options.joint,
+                                        context.progress, context.stop);
     SCAN_CHECK(score(poses, SecondsSince(start)));
   }
   start = std::chrono::steady_clock::now();
@@ -128,7 +137,8 @@ Result<PoseTrial> TrialOf(const DemoPaths& paths, const EvaluateOptions& options
   PoseTrial trial;
   SCAN_TRY(trial.photos, LoadPhotoSet(paths.session));
   SCAN_TRY(trial.truth, ReadTruth(paths.truth, paths.session, trial.photos));
-  const auto indices = EvenlySpread(trial.photos.photos.size(), options.views);
+  const auto indices =
+      EvenlySpread(trial.photos.photos.size(), options.views > 0 ? options.views : 24);
   trial.masks.resize(trial.photos.photos.size());
   trial = Subset(trial, indices);
   SCAN_TRY(trial.masks, MakeMasks(trial.photos, {}, context.progress, context.stop));
@@ -167,7 +177,20 @@ Result<PoseTrial> CapturedTrial(const fs::path& folder, const EvaluateOptions& o
   return TrialOf(paths, options, context);
 }
 
+// The paper renders its photographs from the mesh that it then searches; so does this.
+Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
+  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
+  Fig12Options fig12 = options.fig12;
+  if (options.views > 0) fig12.cameras = static_cast<int>(options.views);
+  if (options.full_size) {
+    fig12.w *= 8;
+    fig12.h *= 8;
+  }
+  return MakeFig12Trial(ExactSurface(*specimen, 0.35), fig12);
+}
+
 Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& context) {
+  if (options.is_fig12()) return Fig12Trial(options);
   if (options.out.empty()) {
     const ScratchFolder scratch;
     return CapturedTrial(scratch.path(), options, context);
@@ -180,9 +203,11 @@ Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& co
 
 std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial) {
   const Intrinsics& in = trial.photos.intrinsics(trial.photos.photos.front());
-  std::string text =
-      fmt::format("{}: {} photographs of {} x {}, simulated station, {} errors\n", options.specimen,
-                  trial.photos.photos.size(), in.w, in.h, options.errors);
+  const std::string where =
+      options.is_fig12() ? fmt::format("Fig 12 protocol, f = {:g} mm", options.fig12.focal_mm)
+                         : fmt::format("simulated station, {} errors", options.errors);
+  std::string text = fmt::format("{}: {} photographs of {} x {}, {}\n", options.specimen,
+                                 trial.photos.photos.size(), in.w, in.h, where);
   if (options.with_paper())
     text += fmt::format(
         "paper: {} directions x {} distances x {} angles, {} chains x {} steps, gate {}, mesh of "
@@ -194,7 +219,13 @@ std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial)
   return text;
 }
 
-Result<CommandOutput> RunEvaluate(const EvaluateOptions& options, const CliContext& context) {
+Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& context) {
+  if (options.what != "poses") {
+    options.model.model = options.what;
+    return EvaluateModel(options.model, context);
+  }
+  // The protocol's masks are exact: no bias is looked for.
+  if (options.is_fig12()) options.joint.rig.mask_bias_px = 0.02;
   SCAN_TRY(const PoseTrial trial, MakeTrial(options, context));
   SCAN_TRY(const auto methods, RunMethods(trial, options, context));
   Json by_method = Json::object();
@@ -202,7 +233,9 @@ Result<CommandOutput> RunEvaluate(const EvaluateOptions& options, const CliConte
     by_method[method.method] = ToJson(method, options.wrong_px);
   return CommandOutput{
       {{"specimen", options.specimen},
-       {"errors", options.errors},
+       {"preset", options.preset},
+       {"errors", options.is_fig12() ? Json() : Json(options.errors)},
+       {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
        {"photographs", trial.photos.photos.size()},
        {"methods", by_method}},
       ProtocolText(options, trial) + TableOf(methods, options.wrong_px, options.per_view)};
@@ -215,21 +248,44 @@ void AddEvaluate(CommandSet& commands) {
   CLI::App& command =
       commands.Add("evaluate", "Poses against a known truth",
                    [options](const CliContext& context) { return RunEvaluate(*options, context); });
-  command.add_option("what", options->what, "poses: capture a synthetic specimen and solve it")
-      ->required()
-      ->check(CLI::IsMember({"poses"}));
+  command
+      .add_option("what", options->what,
+                  "poses: capture a synthetic specimen and solve it; or the folder of a model, "
+                  "compared with --truth")
+      ->required();
+  command.add_option("--truth", options->model.truth,
+                     "of a model: calibrated cameras (fx fy cx cy w h views)");
+  command.add_option("--session", options->model.session, "of a model: its photographs");
+  command.add_option("--mesh", options->model.mesh,
+                     "of a model: its mesh; surface.ply if not given");
+  command.add_option("--exclude-below-mm", options->model.exclude_below_mm,
+                     "of a model: as given when it was made");
   command.add_option("--specimen", options->specimen)
       ->check(CLI::IsMember(SpecimenNames()))
       ->capture_default_str();
+  command
+      .add_option(
+          "--preset", options->preset,
+          "demo: captured on the simulated station; fig12: the paper's random cameras, each "
+          "photograph alone")
+      ->check(CLI::IsMember({"demo", "fig12"}))
+      ->capture_default_str();
+  command.add_option("--focal-mm", options->fig12.focal_mm, "fig12: of a sensor 23.6 mm wide")
+      ->check(CLI::Range(10.0, 1000.0))
+      ->capture_default_str();
+  command.add_flag("--full-size", options->full_size, "fig12: 3696 x 2448 instead of 462 x 306");
+  command.add_option("--seed", options->fig12.seed, "fig12: of the cameras")->capture_default_str();
   command.add_option("--errors", options->errors, "of the simulated rig")
       ->check(CLI::IsMember({"ideal", "static", "dynamic"}))
       ->capture_default_str();
   command.add_option("--method", options->method, "on the same photographs")
       ->check(CLI::IsMember({"joint", "paper", "both"}))
       ->capture_default_str();
-  command.add_option("--views", options->views, "photographs used, evenly spread over the capture")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  command
+      .add_option(
+          "--views", options->views,
+          "photographs: of the 24 captured, evenly spread; fig12: cameras, 100 if not given")
+      ->check(CLI::Range(1, 1000));
   command.add_option("--wrong-px", options->wrong_px, "surface error that makes a pose wrong")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -68,12 +68,20 @@ void AddAtlasOptions(CLI::App& command, ModelOptions& options) {
       ->capture_default_str();
 }
 
+void AddEvidenceOptions(CLI::App& command, ModelOptions& options) {
+  command.add_option("--exclude-below-mm", options.stages.exclude_below_mm,
+                     "what stands lower above the platter (stub, pin, base) is no evidence");
+}
+
 void AddPoseOptions(CLI::App& command, ModelOptions& options) {
   command
       .add_option("--method", options.method,
                   "joint: all photographs with the logged poses; paper: each alone, as published")
       ->check(CLI::IsMember({"joint", "paper"}))
       ->capture_default_str();
+  AddEvidenceOptions(command, options);
+  command.add_flag("--no-priors", options.stages.joint.no_priors,
+                   "joint: leave logged poses aside, as for photographs taken by hand");
   command.add_option("--chains", options.stages.paper.chains, "of the paper's hill climbing")
       ->capture_default_str();
 }
@@ -192,7 +200,7 @@ Result<CommandOutput> RunPose(ModelOptions& options, const CliContext& context) 
   SCAN_TRY(const TriangleMesh mesh, ReadMesh(options.mesh));
   SCAN_TRY(const PhotoSet photos, LoadPhotoSet(options.session));
   SCAN_TRY(const std::vector<Mask> masks,
-           MakeMasks(photos, options.stages.masks, context.progress, context.stop));
+           MakeEvidence(photos, options.stages, context.progress, context.stop));
   SCAN_TRY(Poses poses,
            SolvePoses(mesh, photos, masks, options.stages, context.progress, context.stop));
   poses.model = options.mesh.filename().string();
@@ -209,7 +217,7 @@ Result<CommandOutput> RunTexture(ModelOptions& options, const CliContext& contex
   SCAN_TRY(const PhotoSet photos, LoadPhotoSet(options.session));
   SCAN_TRY(const Poses poses, ReadPoses(options.poses));
   SCAN_TRY(const std::vector<Mask> masks,
-           MakeMasks(photos, options.stages.masks, context.progress, context.stop));
+           MakeEvidence(photos, options.stages, context.progress, context.stop));
   SCAN_TRY(const TextureResult texture,
            MakeTexture(atlas, photos, poses, masks, options.stages.texture, context.progress,
                        context.stop));
@@ -302,6 +310,7 @@ void AddTexture(CommandSet& commands) {
   command.add_option("session", options->session, "session folder")->required();
   command.add_option("--mesh", options->mesh, "OBJ file with texture coordinates")->required();
   command.add_option("--poses", options->poses, "poses.json")->required();
+  AddEvidenceOptions(command, *options);
   AddOut(command, *options, "folder to write");
 }
 

@@ -10,6 +10,7 @@
 #include "drivers/base/staged_folder.h"
 #include "reconstruction/export/glb.h"
 #include "reconstruction/mesh/mesh_io.h"
+#include "reconstruction/pose/exclude_below.h"
 #include "reconstruction/pose/pose_exports.h"
 
 namespace scan {
@@ -90,6 +91,13 @@ std::vector<Figure> MainFigures(const ReconstructResult& result, const SurfaceRe
 
 }  // namespace
 
+Result<std::vector<Mask>> MakeEvidence(const PhotoSet& photos, const StageOptions& options,
+                                       const ProgressFn& progress, std::stop_token stop) {
+  SCAN_TRY(std::vector<Mask> masks, MakeMasks(photos, options.masks, progress, stop));
+  if (options.exclude_below_mm) SCAN_CHECK(ExcludeBelow(photos, *options.exclude_below_mm, masks));
+  return masks;
+}
+
 Result<Poses> SolvePoses(const TriangleMesh& mesh, const PhotoSet& photos,
                          std::span<const Mask> masks, const StageOptions& options,
                          const ProgressFn& progress, std::stop_token stop) {
@@ -141,7 +149,7 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
 
   SCAN_TRY(const AtlasResult atlas, MakeAtlas(result.surface, options.atlas, progress, stop));
   stopwatch.Lap("atlas");
-  SCAN_TRY(const std::vector<Mask> masks, MakeMasks(result.photos, options.masks, progress, stop));
+  SCAN_TRY(const std::vector<Mask> masks, MakeEvidence(result.photos, options, progress, stop));
   stopwatch.Lap("masks");
   SCAN_TRY(result.poses, SolvePoses(result.surface, result.photos, masks, options, progress, stop));
   result.poses.model = "surface.ply";

@@ -37,6 +37,8 @@ struct StageOptions {
   SurfaceOptions surface;
   AtlasOptions atlas;
   MaskOptions masks;
+  std::optional<double> exclude_below_mm;  // above the platter: no evidence, no texture; see
+                                           // ExcludeBelow
   PoseMethod method = PoseMethod::joint;
   JointOptions joint;
   PaperOptions paper;
@@ -68,6 +70,10 @@ struct ReconstructResult {
 // Thread contract: pure but for the files; parallel inside.
 Result<ReconstructResult> Reconstruct(const ReconstructRequest& request,
                                       const ProgressFn& progress = {}, std::stop_token stop = {});
+
+// MakeMasks and then ExcludeBelow. Errors and threads: as these.
+Result<std::vector<Mask>> MakeEvidence(const PhotoSet& photos, const StageOptions& options,
+                                       const ProgressFn& progress, std::stop_token stop);
 
 // By the method chosen. Errors and threads: as SolveJoint and SolvePaper.
 Result<Poses> SolvePoses(const TriangleMesh& mesh, const PhotoSet& photos,

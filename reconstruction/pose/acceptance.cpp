@@ -73,6 +73,31 @@ double TwoWayDistance(const ContourMesh& mesh, const PhotoContour& photo, const 
   return 0.5 * (length > 0 ? model / length : clip_px) + 0.5 * back / static_cast<double>(count);
 }
 
+double Misfit(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+              double sigma_px, double correlation_px, double spacing_px) {
+  constexpr double kClipSigmas = 10;
+  constexpr double kPointPx = 2;  // between points of the photo's contour
+  const double clip_px = kClipSigmas * sigma_px;
+  const auto samples =
+      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, spacing_px);
+  const double all = 0.5 * photo.length_px / correlation_px * kClipSigmas * kClipSigmas;
+  if (samples.empty() || photo.empty()) return all;
+  const auto squared = [&](double distance_px) {
+    const double u = distance_px / sigma_px;
+    return u * u;
+  };
+  const MatchResult match = MatchContour(samples, photo, state.mask_bias_px, clip_px);
+  double model = match.unmatched_px * kClipSigmas * kClipSigmas;
+  for (const ContourMatch& m : match.matches) model += m.length_px * squared(m.residual_px);
+  const ContourGrid grid = ModelGrid(mesh, state);
+  double back = 0;
+  for (const ContourPoint& p : photo.points) {
+    const auto crossing = grid.Nearest(p.position, p.normal, clip_px, 0.5);
+    back += kPointPx * (crossing ? squared(crossing->distance_px) : kClipSigmas * kClipSigmas);
+  }
+  return 0.5 * 0.5 * (model + back) / correlation_px;
+}
+
 std::string RejectionReason(const Explained& explained, double view_prior_chi2,
                             const AcceptanceOptions& options) {
   if (!explained.sees_anything)

@@ -30,6 +30,12 @@ Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
 double TwoWayDistance(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
                       double clip_px, double spacing_px);
 
+// Minus the log-likelihood of the pose, up to a constant: half of the squared distances over sigma
+// squared, both ways (the mean of the two), each clipped at ten sigmas, with `correlation_px` of
+// contour as one independent observation.
+double Misfit(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+              double sigma_px, double correlation_px, double spacing_px);
+
 // Empty when accepted, else the reason in one sentence.
 std::string RejectionReason(const Explained& explained, double view_prior_chi2,
                             const AcceptanceOptions& options);

@@ -16,6 +16,13 @@ double TukeyWeight(double r, double limit) {
   return (1 - u * u) * (1 - u * u);
 }
 
+bool Ignored(const cv::Mat& ignore, const Eigen::Vector2d& pixel) {
+  if (ignore.empty()) return false;
+  const int x = static_cast<int>(std::floor(pixel.x())),
+            y = static_cast<int>(std::floor(pixel.y()));
+  return x >= 0 && y >= 0 && x < ignore.cols && y < ignore.rows && ignore.at<uchar>(y, x) != 0;
+}
+
 }  // namespace
 
 PhotoContour MakePhotoContour(const Mask& mask) {
@@ -24,7 +31,11 @@ PhotoContour MakePhotoContour(const Mask& mask) {
   std::vector<GridSegment> segments;
   Eigen::Vector2d moment = Eigen::Vector2d::Zero();
   Eigen::AlignedBox2d box;
+  photo.ignore = mask.ignore;
+  constexpr double kBetweenContours = 1e5;  // px, so that nothing hangs together across
+  double arc_px = 0;
   for (const Contour& contour : ExtractContours(mask)) {
+    arc_px += kBetweenContours;
     const std::size_t n = contour.points.size();
     for (std::size_t i = 0; i < n; ++i) {
       const ContourPoint& p = contour.points[i];
@@ -34,11 +45,14 @@ PhotoContour MakePhotoContour(const Mask& mask) {
       moment += twice / 6.0 * (p.position + q.position);
       box.extend(p.position);
       photo.touches_border |= (p.flags & kContourCut) != 0;
+      const double start_px = arc_px;
+      arc_px += (q.position - p.position).norm();
       const Eigen::Vector2d normal = p.normal + q.normal;
       const double norm = normal.norm();
       if (norm < 1e-6) continue;
       segments.push_back(
           {p.position, q.position, normal / norm, static_cast<std::uint8_t>(p.flags | q.flags)});
+      photo.arc_px.push_back(start_px);
     }
     for (const ContourPoint& p : Resampled(contour, 2.0).points) {
       if (p.flags == 0) photo.points.push_back(p);
@@ -90,13 +104,15 @@ MatchResult MatchContour(std::span<const ContourSample> samples, const PhotoCont
     const Eigen::Vector2d from = sample.pixel + mask_bias_px * sample.normal;
     const auto crossing = photo.grid.Nearest(from, sample.normal, window_px, kMinCosine);
     if (!crossing) {
-      result.unmatched_px += sample.length_px;
+      if (!Ignored(photo.ignore, sample.pixel)) result.unmatched_px += sample.length_px;
       continue;
     }
-    if (photo.grid.segments()[crossing->segment].flags != 0) continue;
-    result.matches.push_back({sample.point, from + crossing->distance_px * sample.normal,
-                              sample.normal, crossing->distance_px, sample.length_px,
-                              sample.vertices});
+    const GridSegment& segment = photo.grid.segments()[crossing->segment];
+    if (segment.flags != 0) continue;
+    const Eigen::Vector2d target = from + crossing->distance_px * sample.normal;
+    result.matches.push_back({sample.point, target, sample.normal, crossing->distance_px,
+                              sample.length_px, sample.vertices,
+                              photo.arc_px[crossing->segment] + (target - segment.a).norm()});
   }
   return result;
 }

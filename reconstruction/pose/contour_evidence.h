@@ -20,6 +20,8 @@ namespace scan {
 // A photograph's contour, prepared once.
 struct PhotoContour {
   ContourGrid grid;                  // every segment, flagged ones too
+  std::vector<double> arc_px;        // of each segment's start, along all contours; far between two
+  cv::Mat ignore;                    // CV_8U or empty: non-zero = no evidence here
   std::vector<ContourPoint> points;  // evidence only, about 2 px apart
   double length_px = 0;              // of evidence
   double area_px = 0;
@@ -61,6 +63,7 @@ struct ContourMatch {
   double residual_px = 0;  // bias taken off
   double length_px = 0;
   std::array<std::uint32_t, 2> vertices{};  // of the mesh edge the point lies on
+  double arc_px = 0;                        // place of `target` along the photo's contour
 };
 
 struct MatchResult {
@@ -71,7 +74,8 @@ struct MatchResult {
 
 // Partners along the model's image normal, within +-window_px of where the mask bias puts them,
 // normals within 60 degrees, so that the far side of a thin leg is never taken. Flagged pieces of
-// the photo's contour are neither partners nor missing ones.
+// the photo's contour are neither partners nor missing ones, and a sample in an ignored region
+// needs none.
 MatchResult MatchContour(std::span<const ContourSample> samples, const PhotoContour& photo,
                          double mask_bias_px, double window_px);
 

@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/pose/residual_statistics.h"
+
 namespace scan {
 namespace {
 
+constexpr int kEstimates = 2;
 constexpr double kBinaryVariance = 1.0 / 12.0;  // px^2, quantisation of a binary mask
 
 ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
-                double window_px, const RefineOptions& options) {
+                double window_px, double correlation_px, const RefineOptions& options) {
   ViewFit fit;
   const auto samples =
       FindContourSamples(mesh, state.camera_from_model, state.intrinsics, options.spacing_px);
@@ -21,9 +24,15 @@ ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewSt
   fit.sigma_px = std::max(RobustSigma(fit.match.matches), floor);
   EvidenceWeights weights;
   weights.sigma_px = fit.sigma_px;
-  weights.correlation_px = options.correlation_px;
+  weights.correlation_px = correlation_px;
   fit.evidence = Condense(state, fit.match.matches, state.camera_from_model * mesh.centre, weights);
   return fit;
+}
+
+double PooledCorrelation(std::span<const ViewFit> fits) {
+  std::vector<std::span<const ContourMatch>> views;
+  for (const ViewFit& fit : fits) views.emplace_back(fit.match.matches);
+  return CorrelationLength(views);
 }
 
 // Pixels that a view's surface moves at most, about, between two poses.
@@ -41,7 +50,7 @@ double MotionPx(const ContourMesh& mesh, const CameraFromModel& a, const CameraF
 std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
                               std::span<const PhotoContour> photos, const std::vector<bool>& use,
                               const RigParameters& parameters, double window_px,
-                              const RefineOptions& options) {
+                              double correlation_px, const RefineOptions& options) {
   std::vector<ViewFit> fits(photos.size());
   tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
     if (!use[i]) return;
@@ -49,7 +58,7 @@ std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
     const ViewState state{rig.CameraFromModelOf(parameters, view),
                           rig.IntrinsicsOf(parameters, rig.views()[i].lens),
                           parameters.mask_bias_px};
-    fits[i] = FitView(mesh, photos[i], state, window_px, options);
+    fits[i] = FitView(mesh, photos[i], state, window_px, correlation_px, options);
   });
   return fits;
 }
@@ -61,10 +70,13 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
   RefineResult result;
   result.parameters = start;
   double window_px = options.first_window_px;
+  result.correlation_px = options.correlation_floor_px;
+  int estimated = 0;  // times the correlation was estimated; then it stays, so that this converges
   std::vector<std::optional<CondensedEvidence>> evidence(photos.size());
   for (; result.iterations < options.max_iterations && !stop.stop_requested();
        ++result.iterations) {
-    result.fits = FitViews(mesh, rig, photos, use, result.parameters, window_px, options);
+    result.fits = FitViews(mesh, rig, photos, use, result.parameters, window_px,
+                           result.correlation_px, options);
     for (std::size_t i = 0; i < photos.size(); ++i) evidence[i] = result.fits[i].evidence;
     const RigParameters before = result.parameters;
     result.cost = SolveRig(rig, evidence, result.parameters);
@@ -77,6 +89,11 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
                                              rig.nominal_intrinsics(rig.views()[i].lens)));
     }
     const bool at_last_window = window_px <= options.last_window_px;
+    if (at_last_window && estimated < kEstimates) {
+      ++estimated;
+      result.correlation_px =
+          std::max(options.correlation_floor_px, PooledCorrelation(result.fits));
+    }
     if (at_last_window && moved_px < options.converged_px) {
       result.converged = true;
       break;
@@ -87,8 +104,8 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
     window_px = std::max(options.last_window_px,
                          std::min(0.7 * window_px, std::max(6 * largest_sigma, moved_px)));
   }
-  result.fits =
-      FitViews(mesh, rig, photos, use, result.parameters, options.last_window_px, options);
+  result.fits = FitViews(mesh, rig, photos, use, result.parameters, options.last_window_px,
+                         result.correlation_px, options);
   return result;
 }
 

@@ -18,8 +18,10 @@ namespace scan {
 struct RefineOptions {
   double first_window_px = 64;  // search along the normal; shrinks with the residuals
   double last_window_px = 8;
-  double spacing_px = 4;         // of contour samples
-  double correlation_px = 43;    // of model discrepancy along the contour, see EvidenceWeights
+  double spacing_px = 4;  // of contour samples
+  // Contour that counts as one independent observation is estimated from the residuals of all
+  // views, and is at least this: real residuals are model discrepancy.
+  double correlation_floor_px = 43;
   double sigma_floor_px = 0.15;  // sub-pixel contours; binary masks add a pixel's quantisation
   int max_iterations = 40;
   double converged_px = 0.01;  // largest motion of any view's surface in the last step
@@ -35,6 +37,7 @@ struct RefineResult {
   RigParameters parameters;
   std::vector<ViewFit> fits;  // at `parameters`
   double cost = 0;            // of the last rig solve
+  double correlation_px = 0;  // used for the weights, see RefineOptions
   int iterations = 0;
   bool converged = false;
 };
@@ -51,6 +54,6 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
 std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
                               std::span<const PhotoContour> photos, const std::vector<bool>& use,
                               const RigParameters& parameters, double window_px,
-                              const RefineOptions& options);
+                              double correlation_px, const RefineOptions& options);
 
 }  // namespace scan

@@ -105,9 +105,11 @@ void DescribeShared(const PhotoSet& photos, const RigModel& rig, const RigPoster
     poses.nuisances[fmt::format("turntable_offset_rad_epoch_{}", rig.epoch_ids()[i])] =
         EstimateAt(posterior, layout.epoch(static_cast<int>(i)), parameters.epochs[i]);
   }
-  for (std::size_t i = 0; i < rig.mounting_ids().size(); ++i)
+  for (std::size_t i = 0; i < rig.mounting_ids().size(); ++i) {
+    if (RigModel::IsViewMounting(rig.mounting_ids()[i])) continue;
     poses.mountings.push_back(
         {rig.mounting_ids()[i], rig.TableFromModelOf(parameters, static_cast<int>(i))});
+  }
   RigParameters shared_only = parameters;
   for (auto& own : shared_only.views) own.fill(0);
   for (std::size_t i = 0; i < rig.views().size(); ++i) {

@@ -217,20 +217,21 @@ void AddFreedom(const RigModel& rig, const RigParameters& parameters,
 }
 
 std::string Sentence(const FreeDirection& d) {
+  const std::string of = (d.scope == FreeDirection::Scope::view ? "View " : "Mounting ") + d.of;
   const std::string axis =
       fmt::format("({:.3f}, {:.3f}, {:.3f})", d.axis.x(), d.axis.y(), d.axis.z());
   if (d.kind == FreeDirection::Kind::rotation)
     return fmt::format(
-        "Mounting {}: the silhouettes do not show how far the specimen is turned about the axis {} "
+        "{}: the silhouettes do not show how far the specimen is turned about the axis {} "
         "through ({:.2f}, {:.2f}, {:.2f}) mm of the model; the angle given is arbitrary. A pin, a "
         "notch "
         "or beads that X-ray and camera both see would fix it.",
-        d.of, axis, d.point.x(), d.point.y(), d.point.z());
+        of, axis, d.point.x(), d.point.y(), d.point.z());
   return fmt::format(
-      "Mounting {}: the silhouettes do not show where the specimen stands along {} of the model; "
+      "{}: the silhouettes do not show where the specimen stands along {} of the model; "
       "it is "
       "held at the prior. Photographs from other directions would fix it.",
-      d.of, axis);
+      of, axis);
 }
 
 }  // namespace scan

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/pose/rig_chain.h"
 
 namespace scan {
@@ -14,15 +15,6 @@ int IndexOf(std::vector<T>& known, const T& id) {
   if (found != known.end()) return static_cast<int>(found - known.begin());
   known.push_back(id);
   return static_cast<int>(known.size()) - 1;
-}
-
-std::optional<CameraFromTable> NominalPose(const PhotoSet& photos, const Photo& photo) {
-  if (photo.camera_from_table) return photo.camera_from_table;
-  const Aim& aim = photos.aims[photo.aim];
-  if (!aim.camera_from_lift || !photo.turntable_rad) return std::nullopt;
-  const double lift_mm = photo.lift_mm ? photo.lift_mm->nominal : 0.0;
-  return *aim.camera_from_lift * MakeLiftFromStation(lift_mm, photos.lift_direction_in_station) *
-         MakeStationFromTable(photo.turntable_rad->nominal);
 }
 
 // The axis's own error, no less than the floor.
@@ -40,13 +32,14 @@ RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(pr
   for (const Aim& aim : photos.aims) aim_sigma_.push_back(aim.sigma);
   for (const Photo& photo : photos.photos) {
     RigView view;
-    view.mounting = IndexOf(mounting_ids_, photo.mounting_id);
+    const auto nominal = scan::NominalCameraFromTable(photos, photo);
+    view.mounting = IndexOf(mounting_ids_, nominal ? photo.mounting_id : ' ' + photo.id);
     view.epoch = IndexOf(epoch_ids_, photo.reference_epoch);
     view.aim = photo.aim;
     view.lens = photos.aims[photo.aim].lens_state;
     view.lift_direction = photos.lift_direction_in_station.normalized();
     epoch_sigma_rad_.resize(epoch_ids_.size(), 0);
-    if (const auto nominal = NominalPose(photos, photo)) {
+    if (nominal) {
       view.logged = true;
       view.turns = photo.turntable_rad.has_value();
       if (view.turns) {
@@ -64,6 +57,17 @@ RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(pr
     views_.push_back(view);
   }
   start_.resize(mounting_ids_.size());
+}
+
+void RigModel::set_view_start(int view, const CameraFromModel& camera_from_model,
+                              const Eigen::Vector3d& mass_centre) {
+  RigView& v = views_[static_cast<std::size_t>(view)];
+  v.placed = true;
+  v.camera_from_station =
+      CameraFromStation(Eigen::Matrix3d::Identity(), camera_from_model * mass_centre);
+  start_[v.mounting] =
+      TableFromModel(camera_from_model.rotation(),
+                     camera_from_model.translation() - v.camera_from_station.translation());
 }
 
 RigParameters RigModel::Nominal() const {

@@ -57,7 +57,8 @@ struct RigParameters {
 // What a view takes from the shared unknowns.
 struct RigView {
   int mounting = 0, epoch = 0, aim = 0, lens = 0;
-  bool logged = false;  // a nominal pose exists
+  bool logged = false;  // a nominal pose exists; else the view is a mounting of its own
+  bool placed = false;  // set_view_start was called
   bool turns = false;   // a logged turntable angle exists
   // Nominal, at the logged lift: camera_from_table(nominal) . Rz(-turntable).
   CameraFromStation camera_from_station;
@@ -69,13 +70,20 @@ struct RigView {
 
 class RigModel {
  public:
-  // Views without a nominal pose have `logged` = false and take no part.
+  // A view without a nominal pose joins through the model alone: it is a mounting of its own, named
+  // after the photograph's id with a space before it, its table the camera's frame moved to where
+  // the specimen stands.
   RigModel(const PhotoSet& photos, const RigPriors& priors);
 
   const RigPriors& priors() const { return priors_; }
   std::span<const RigView> views() const { return views_; }
   const std::vector<std::string>& mounting_ids() const { return mounting_ids_; }
   const std::vector<int>& epoch_ids() const { return epoch_ids_; }
+  // A mounting that is one view without a nominal pose.
+  static bool IsViewMounting(const std::string& id) { return id.starts_with(' '); }
+  // For such a view: its start, and the specimen's distance with it.
+  void set_view_start(int view, const CameraFromModel& camera_from_model,
+                      const Eigen::Vector3d& mass_centre);
   double epoch_sigma_rad(int epoch) const { return epoch_sigma_rad_[epoch]; }
   const std::vector<RigidSigma>& aim_sigma() const { return aim_sigma_; }
   const std::vector<IntrinsicsSigma>& lens_sigma() const { return lens_sigma_; }

@@ -19,7 +19,7 @@ RefineOptions ScaledTo(RefineOptions options, int width) {
   options.first_window_px *= scale;
   options.last_window_px = std::max(4.0, options.last_window_px * scale);
   options.spacing_px = std::max(2.0, options.spacing_px * scale);
-  options.correlation_px *= scale;
+  options.correlation_floor_px *= scale;
   return options;
 }
 
@@ -91,10 +91,8 @@ std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
       judgement.reason = "the mask is empty: no specimen was found in the photograph";
       return;
     }
-    if (!rig.views()[i].logged) {
-      judgement.reason =
-          "no nominal pose: neither turntable and lift were logged nor a "
-          "transform_matrix given";
+    if (!rig.views()[i].logged && !rig.views()[i].placed) {
+      judgement.reason = "no pose was found from which the mesh looks like the photograph";
       return;
     }
     const ViewState state{rig.CameraFromModelOf(fit.parameters, view),
@@ -125,7 +123,7 @@ Poses Describe(const ContourMesh& mesh, const PhotoSet& photos, std::span<const 
     view.reason = judgements[i].reason;
     view.status = view.reason.empty() ? ViewStatus::accepted : ViewStatus::rejected;
     view.contour_rms_px = judgements[i].explained.rms_px;
-    if (!rig.views()[i].logged) {
+    if (!rig.views()[i].logged && !rig.views()[i].placed) {
       view.covariance = 1e6 * Matrix6d::Identity();
       return;
     }
@@ -141,6 +139,64 @@ Poses Describe(const ContourMesh& mesh, const PhotoSet& photos, std::span<const 
     view.cost_l1_px = cost.l1_px;
   });
   return poses;
+}
+
+PhotoSet WithoutPoses(PhotoSet photos) {
+  for (Aim& aim : photos.aims) aim.camera_from_lift.reset();
+  for (Photo& photo : photos.photos) {
+    photo.camera_from_table.reset();
+    photo.turntable_rad.reset();
+  }
+  return photos;
+}
+
+using Alternatives = std::vector<std::vector<AlternativePose>>;
+
+// Finds a start for every photograph without a nominal pose and marks its mounting as known; one
+// that has none is left out of `use`. Returns what each cannot decide between.
+Alternatives StartViewsAlone(const ContourMesh& mesh, const PhotoSet& photos,
+                             std::span<const PhotoContour> contours, const JointOptions& options,
+                             const RefineOptions& refine, RigModel& rig, std::vector<bool>& use,
+                             std::vector<bool>& known, const std::stop_token& stop) {
+  constexpr double kUndecided = 4.6;  // log-likelihood: 1 to 100
+  Alternatives alternatives(contours.size());
+  std::vector<int> alone;
+  for (std::size_t i = 0; i < contours.size(); ++i)
+    if (use[i] && !rig.views()[i].logged) alone.push_back(static_cast<int>(i));
+  if (alone.empty()) return alternatives;
+  const double distance_mm = photos.approx_distance_mm.value_or(0);
+  auto search = options.view_search;
+  if (!search)
+    search = std::make_shared<ViewSearch>(mesh, distance_mm, options.start, options.view_start);
+  std::vector<std::vector<ViewCandidate>> found(alone.size());
+  tbb::parallel_for(std::size_t{0}, alone.size(), [&](std::size_t k) {
+    const auto i = static_cast<std::size_t>(alone[k]);
+    found[k] = search->Solve(contours[i], rig.nominal_intrinsics(rig.views()[i].lens), distance_mm,
+                             refine, stop);
+  });
+  for (std::size_t k = 0; k < alone.size(); ++k) {
+    const auto i = static_cast<std::size_t>(alone[k]);
+    use[i] = !found[k].empty();
+    known[rig.views()[i].mounting] = true;
+    if (found[k].empty()) continue;
+    rig.set_view_start(alone[k], found[k].front().camera_from_model, mesh.centre);
+    for (std::size_t c = 1; c < found[k].size(); ++c) {
+      const double gap = found[k][c].misfit - found[k].front().misfit;
+      if (gap < kUndecided) alternatives[i].push_back({found[k][c].camera_from_model, gap});
+    }
+  }
+  return alternatives;
+}
+
+// Directions of mountings that are one view are the view's.
+std::vector<FreeDirection> ByView(const PhotoSet& photos, std::vector<FreeDirection> free) {
+  for (FreeDirection& direction : free) {
+    if (!RigModel::IsViewMounting(direction.of)) continue;
+    direction.scope = FreeDirection::Scope::view;
+    for (const Photo& photo : photos.photos)
+      if (' ' + photo.id == direction.of) direction.of = photo.name;
+  }
+  return free;
 }
 
 // What the accepted views of each mounting leave free.
@@ -164,18 +220,17 @@ std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigMode
 
 }  // namespace
 
-Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
+Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
                          std::span<const Mask> masks, const JointOptions& options,
                          const ProgressFn& progress, std::stop_token stop) {
-  SCAN_CHECK(CheckPoseInput(mesh, photos, masks));
+  SCAN_CHECK(CheckPoseInput(mesh, given, masks));
+  const PhotoSet photos = options.no_priors ? WithoutPoses(given) : given;
   RigModel rig(photos, options.rig);
   const std::vector<PhotoContour> contours = PhotoContours(masks);
   std::vector<bool> use(contours.size());
-  for (std::size_t i = 0; i < use.size(); ++i)
-    use[i] = rig.views()[i].logged && !contours[i].empty();
+  for (std::size_t i = 0; i < use.size(); ++i) use[i] = !contours[i].empty();
   if (std::none_of(use.begin(), use.end(), [](bool u) { return u; }))
-    return BadInput("no photograph with a nominal pose shows a specimen", "session",
-                    "log turntable and lift or give transform_matrix, and check the masks");
+    return BadInput("no photograph shows a specimen", "session", "check the masks");
 
   const ContourMesh contour_mesh(mesh);
   std::vector<bool> known(rig.mounting_ids().size(), false);
@@ -187,6 +242,9 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
   const double scale = ScaleOf(photos);
   const RefineOptions refine = ScaledTo(options.refine, photos.intrinsics(photos.photos.front()).w);
   Report(progress, "poses: search", 0.0);
+  const Alternatives alternatives =
+      StartViewsAlone(contour_mesh, photos, contours, options, refine, rig, use, known, stop);
+  if (stop.stop_requested()) return Cancelled("pose");
   SCAN_CHECK(ChooseStarts(contour_mesh, rig, contours, use, known, options.start, refine, stop));
   Report(progress, "poses: refine", 0.5);
   RefineResult fit = RefineJoint(contour_mesh, rig, contours, use, rig.Nominal(), refine, stop);
@@ -210,14 +268,19 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
   ObservabilityOptions observability;
-  observability.weights.correlation_px = refine.correlation_px;
+  observability.weights.correlation_px = fit.correlation_px;
   RigPosterior posterior = PosteriorOf(rig, fit);
   const auto free = FreeDirections(contour_mesh, rig, fit, judgements, observability);
   for (const FreeDirection& direction : free) AddFreedom(rig, fit.parameters, direction, posterior);
   Poses poses = Describe(contour_mesh, photos, masks, rig, fit, posterior, judgements);
   poses.model = options.model;
-  poses.free_directions = free;
-  for (const FreeDirection& direction : free) poses.notes.push_back(Sentence(direction));
+  poses.free_directions = ByView(photos, free);
+  for (std::size_t i = 0; i < alternatives.size(); ++i)
+    poses.views[i].alternatives = alternatives[i];
+  poses.nuisances["residual_sigma_px"].value = PooledSigma(fit.fits, use);
+  poses.nuisances["residual_correlation_px"].value = fit.correlation_px;
+  for (const FreeDirection& direction : poses.free_directions)
+    poses.notes.push_back(Sentence(direction));
   return poses;
 }
 

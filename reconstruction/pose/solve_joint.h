@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -17,6 +18,7 @@
 #include "reconstruction/pose/poses.h"
 #include "reconstruction/pose/rig_model.h"
 #include "reconstruction/pose/start_search.h"
+#include "reconstruction/pose/view_start.h"
 
 namespace scan {
 
@@ -26,14 +28,20 @@ struct JointOptions {
   RefineOptions refine;  // px of a picture 1848 px wide; scaled to the photos
   AcceptanceOptions acceptance;
   StartOptions start;
+  ViewStartOptions view_start;  // for photographs without a nominal pose
+  bool no_priors = false;       // logged poses are left aside, as if every photograph had none
+  // Of this mesh, to share it between calls; else made when needed.
+  std::shared_ptr<const ViewSearch> view_search;
   // Known placings by mounting id; the start search runs for the others.
   std::map<std::string, TableFromModel> table_from_model;
 };
 
-// Finds camera_from_model of every photograph.
+// Finds camera_from_model of every photograph. Those without a nominal pose are each searched and
+// refined alone and join through the model: they share camera, mask bias and CT scale. What such a
+// photograph cannot decide between is listed as `alternatives` of its view.
 // `masks`: one per photo, in order; an empty mask rejects its view. The mesh is in mm, model frame.
 // Errors: bad_input for a mesh without faces or with NaN vertices, no photos, a number or size of
-// masks that does not match, no mask with a specimen, no nominal pose; cancelled.
+// masks that does not match, no mask with a specimen; cancelled.
 // Thread contract: pure; parallel inside; the same bytes for any number of threads.
 Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& photos,
                          std::span<const Mask> masks, const JointOptions& options,

@@ -8,46 +8,15 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "reconstruction/pose/picture_cost.h"
 #include "reconstruction/pose/rigid_motion.h"
-#include "reconstruction/pose/silhouette_raster.h"
+#include "reconstruction/pose/start_templates.h"
 
 namespace scan {
 namespace {
 
-constexpr int kSide = 72;            // px of a template
-constexpr double kClip = 0.25;       // of a contour distance, in roots of the area
-constexpr float kStep = 1.0f / 512;  // of stored distances, in roots of the area
-
-// Contour distances around a silhouette's centroid in units of the root of its area.
-struct DistanceField {
-  cv::Mat steps;    // CV_8U, in kStep, clipped
-  float scale = 1;  // px per unit
-  float clip = static_cast<float>(kClip);
-  // Outside of the field everything is far.
-  float At(const Eigen::Vector2f& p) const {
-    const int x = static_cast<int>(p.x() * scale + 0.5f * static_cast<float>(steps.cols));
-    const int y = static_cast<int>(p.y() * scale + 0.5f * static_cast<float>(steps.rows));
-    if (x < 0 || y < 0 || x >= steps.cols || y >= steps.rows) return clip;
-    return kStep * static_cast<float>(steps.ptr<uchar>(y)[x]);
-  }
-};
-
-struct Silhouette {
-  DistanceField field;
-  std::vector<Eigen::Vector2f> points;  // of the contour, about the centroid, in roots of the area
-  double root_area = 0;                 // normalised image units
-};
-
-struct Template {
-  Silhouette silhouette;
-  Eigen::Matrix3d camera_from_model = Eigen::Matrix3d::Identity();  // rotation
-  Eigen::Vector2d centroid =
-      Eigen::Vector2d::Zero();  // from the mass centre, normalised image units
-};
+using namespace start;
 
 struct SearchView {
   int view = 0;
@@ -57,92 +26,15 @@ struct SearchView {
   double distance_mm = 0;              // nominal, to the table's origin
 };
 
-std::vector<Eigen::Vector2f> Thinned(const std::vector<Eigen::Vector2f>& points, int count) {
-  std::vector<Eigen::Vector2f> thin;
-  if (points.empty()) return thin;
-  for (int i = 0; i < count; ++i)
-    thin.push_back(
-        points[static_cast<std::size_t>(i) * points.size() / static_cast<std::size_t>(count)]);
-  return thin;
-}
-
-// `contour`: about the centroid, in roots of the area.
-Silhouette MakeSilhouette(const std::vector<Eigen::Vector2f>& contour, double root_area,
-                          int count) {
-  Silhouette s;
-  s.root_area = root_area;
-  s.points = Thinned(contour, count);
-  float reach = 0.1f;
-  for (const auto& p : contour) reach = std::max({reach, std::abs(p.x()), std::abs(p.y())});
-  reach += static_cast<float>(kClip);
-  constexpr int kFieldSide = 112;
-  s.field.scale = 0.5f * kFieldSide / reach;
-  cv::Mat seeds(kFieldSide, kFieldSide, CV_8U, cv::Scalar(255));
-  for (const auto& p : contour) {
-    const int x = static_cast<int>(p.x() * s.field.scale + 0.5f * kFieldSide);
-    const int y = static_cast<int>(p.y() * s.field.scale + 0.5f * kFieldSide);
-    if (x >= 0 && y >= 0 && x < kFieldSide && y < kFieldSide) seeds.at<uchar>(y, x) = 0;
-  }
-  cv::Mat distance;
-  cv::distanceTransform(seeds, distance, cv::DIST_L2, 3, CV_32F);
-  distance.convertTo(s.field.steps, CV_8U, 1.0 / (s.field.scale * kStep));  // saturates
-  const double top = kClip / kStep;
-  cv::min(s.field.steps, top, s.field.steps);
-  return s;
-}
-
-Template RenderTemplate(const TriangleMesh& mesh, const Eigen::Vector3d& centre, double radius_mm,
-                        const Eigen::Vector3d& direction, double distance_mm, int count) {
-  Template t;
-  const Eigen::Vector3d z = -direction;
-  const Eigen::Vector3d x = z.unitOrthogonal();
-  t.camera_from_model.row(0) = x.transpose();
-  t.camera_from_model.row(1) = z.cross(x).transpose();
-  t.camera_from_model.row(2) = z.transpose();
-  const double focal =
-      0.47 * kSide * std::max(distance_mm - radius_mm, 0.1 * radius_mm) / radius_mm;
-  std::vector<Eigen::Vector2f> pixels;
-  pixels.reserve(mesh.vertices.size());
-  for (const auto& v : mesh.vertices) {
-    const Eigen::Vector3d c = t.camera_from_model * (v - centre);
-    const double scale = focal / std::max(c.z() + distance_mm, 1e-6);
-    pixels.emplace_back(static_cast<float>(0.5 * kSide + scale * c.x()),
-                        static_cast<float>(0.5 * kSide + scale * c.y()));
-  }
-  cv::Mat mask(kSide, kSide, CV_8U, cv::Scalar(0));
-  FillTriangles(pixels, mesh.faces, mask, true);
-  const cv::Moments moments = cv::moments(mask, true);
-  if (moments.m00 < 1) return t;
-  const Eigen::Vector2d centroid(moments.m10 / moments.m00 + 0.5, moments.m01 / moments.m00 + 0.5);
-  t.centroid = (centroid - Eigen::Vector2d::Constant(0.5 * kSide)) / focal;
-  const double root_area = std::sqrt(moments.m00);
-  std::vector<Eigen::Vector2f> contour;
-  for (const cv::Point& p : BoundaryPixels(mask)) {
-    const Eigen::Vector2d about = Eigen::Vector2d(p.x + 0.5, p.y + 0.5) - centroid;
-    contour.push_back((about / root_area).cast<float>());
-  }
-  t.silhouette = MakeSilhouette(contour, root_area / focal, count);
-  return t;
-}
-
 SearchView MakeSearchView(const RigModel& rig, const PhotoContour& photo, int view, int count) {
   SearchView s;
   s.view = view;
   const CameraFromTable camera_from_table = rig.NominalCameraFromTable(view);
-  const Intrinsics& in = rig.nominal_intrinsics(rig.views()[view].lens);
-  const Eigen::Vector3d axis = RayOfPixel(in, photo.centroid).normalized();
-  const Eigen::Matrix3d turn =
-      Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  Eigen::Matrix3d turn;
+  s.silhouette = SilhouetteOf(photo, rig.nominal_intrinsics(rig.views()[view].lens), count, turn);
   s.centred_from_table = turn * camera_from_table.rotation();
   s.centre_in_table = CameraCentre(camera_from_table);
   s.distance_mm = s.centre_in_table.norm();
-  const double root_area = std::sqrt(photo.area_px / (in.fl_x * in.fl_y));
-  std::vector<Eigen::Vector2f> contour;
-  for (const GridSegment& segment : photo.grid.segments()) {
-    const Eigen::Vector3d ray = turn * RayOfPixel(in, 0.5 * (segment.a + segment.b));
-    contour.push_back((ray.head<2>() / (ray.z() * root_area)).cast<float>());
-  }
-  s.silhouette = MakeSilhouette(contour, root_area, count);
   return s;
 }
 
@@ -195,20 +87,6 @@ struct ScoreTables {
     return scores[(view * directions + direction) * angles + angle];
   }
 };
-
-std::vector<Eigen::Vector2f> Rotated(const std::vector<Eigen::Vector2f>& points, double angle) {
-  const Eigen::Rotation2Df turn(static_cast<float>(angle));
-  std::vector<Eigen::Vector2f> rotated;
-  rotated.reserve(points.size());
-  for (const auto& p : points) rotated.push_back(turn * p);
-  return rotated;
-}
-
-float MeanDistance(const DistanceField& field, const std::vector<Eigen::Vector2f>& points) {
-  float sum = 0;
-  for (const auto& p : points) sum += field.At(p);
-  return sum / static_cast<float>(points.size());
-}
 
 ScoreTables ScoreAll(const std::vector<Template>& templates, const std::vector<SearchView>& views,
                      double template_distance_mm, const StartOptions& options) {

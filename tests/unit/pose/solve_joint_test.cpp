@@ -152,9 +152,6 @@ TEST(SolveJoint, BadInputIsRefusedWithAReason) {
   masks = scene.masks;
   for (Mask& mask : masks) mask.coverage.setTo(0);
   ExpectRefused(mesh, scene.photos, masks, "shows a specimen");
-  PhotoSet unlogged = scene.photos;
-  for (Photo& photo : unlogged.photos) photo.turntable_rad.reset();
-  ExpectRefused(mesh, unlogged, scene.masks, "nominal pose");
 }
 
 TEST(SolveJoint, StopsWhenAsked) {

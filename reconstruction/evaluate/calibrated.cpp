@@ -1,0 +1,168 @@
+#include "reconstruction/evaluate/calibrated.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "drivers/base/files.h"
+#include "drivers/base/units.h"
+#include "reconstruction/pose/contour_evidence.h"
+#include "reconstruction/pose/contour_sample.h"
+#include "reconstruction/pose/rigid_motion.h"
+
+namespace scan {
+namespace {
+
+constexpr double kWindowPx = 25;
+constexpr double kSpacingPx = 2;
+
+CameraFromModel PoseOfRows(const nlohmann::json& rows) {
+  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 4; ++c)
+      isometry.matrix()(r, c) =
+          rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
+  return CameraFromModel(isometry);
+}
+
+struct Pair {
+  Eigen::Matrix3d solved, calibrated;
+};
+
+// The rotation of the model frame that brings the calibrated cameras nearest to the solved ones.
+Eigen::Matrix3d Alignment(const std::vector<Pair>& pairs) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Pair& p : pairs) sum += p.calibrated.transpose() * p.solved;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
+  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+}
+
+// What turns the specimen from one calibrated view to the next, in the camera frame.
+Eigen::Vector3d AxisOf(const std::vector<Pair>& pairs) {
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i + 1 < pairs.size(); ++i) {
+    const Eigen::Vector3d w = LogSo3(pairs[i + 1].calibrated * pairs[i].calibrated.transpose());
+    axis += w.dot(axis) < 0 ? Eigen::Vector3d(-w) : w;
+  }
+  return axis.normalized();
+}
+
+std::vector<double> ContourDistances(const ContourMesh& mesh, const PhotoContour& photo,
+                                     const PoseOf& pose) {
+  const auto samples =
+      FindContourSamples(mesh, pose.camera_from_model, pose.intrinsics, kSpacingPx);
+  const MatchResult match = MatchContour(samples, photo, 0, kWindowPx);
+  std::vector<double> distances;
+  for (const ContourMatch& m : match.matches) distances.push_back(std::abs(m.residual_px));
+  distances.insert(distances.end(), static_cast<std::size_t>(match.unmatched_px / kSpacingPx),
+                   kWindowPx);
+  return distances;
+}
+
+// Of all outlines together.
+Spread PooledDistances(const ContourMesh& mesh, std::span<const Mask> masks,
+                       const std::vector<std::optional<PoseOf>>& poses) {
+  std::vector<std::vector<double>> each(masks.size());
+  tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t i) {
+    if (poses[i]) each[i] = ContourDistances(mesh, MakePhotoContour(masks[i]), *poses[i]);
+  });
+  std::vector<double> all;
+  for (const auto& distances : each) all.insert(all.end(), distances.begin(), distances.end());
+  return SpreadOf(std::move(all));
+}
+
+std::vector<MovedParameter> MovedLens(const Poses& poses, const PhotoSet& photos,
+                                      const Intrinsics& truth) {
+  std::vector<MovedParameter> moved;
+  for (const LensState& lens : photos.lens_states) {
+    const auto solved = poses.lens_states.find(lens.id);
+    if (solved == poses.lens_states.end()) continue;
+    const Intrinsics& nominal = lens.intrinsics;
+    for (const auto& [name, estimate] : solved->second.parameters) {
+      MovedParameter p{lens.id, name, estimate.value, estimate.sigma, estimate.prior_sigma, 0};
+      if (name == "cx") {
+        p.moved -= nominal.cx;
+        p.truth = truth.cx - nominal.cx;
+      } else if (name == "cy") {
+        p.moved -= nominal.cy;
+        p.truth = truth.cy - nominal.cy;
+      } else {
+        p.truth = std::log(truth.fl_x / nominal.fl_x);
+      }
+      moved.push_back(p);
+    }
+  }
+  return moved;
+}
+
+}  // namespace
+
+Result<CalibratedCameras> ReadCalibrated(const std::filesystem::path& path) {
+  SCAN_TRY(const std::string text, ReadTextFile(path));
+  CalibratedCameras cameras;
+  try {
+    const auto json = nlohmann::json::parse(text);
+    Intrinsics& in = cameras.intrinsics;
+    in.w = json.at("w").get<int>();
+    in.h = json.at("h").get<int>();
+    in.fl_x = json.at("fx").get<double>();
+    in.fl_y = json.at("fy").get<double>();
+    in.cx = json.at("cx").get<double>();
+    in.cy = json.at("cy").get<double>();
+    for (const auto& [name, rows] : json.at("views").items())
+      cameras.views[name] = PoseOfRows(rows);
+  } catch (const nlohmann::json::exception& e) {
+    return BadInput(std::string("not a file of calibrated cameras (") + e.what() + ")",
+                    path.string(), "give fx, fy, cx, cy, w, h and views: 3 rows of 4 by name");
+  }
+  return cameras;
+}
+
+Result<CalibratedFigures> CompareWithCalibrated(const Poses& poses, const CalibratedCameras& truth,
+                                                const TriangleMesh& mesh, const PhotoSet& photos,
+                                                std::span<const Mask> masks) {
+  CalibratedFigures figures;
+  figures.views = poses.views.size();
+  std::vector<Pair> pairs;
+  std::vector<std::optional<PoseOf>> solved(poses.views.size()), calibrated(poses.views.size());
+  for (std::size_t i = 0; i < poses.views.size(); ++i) {
+    const ViewPose& view = poses.views[i];
+    if (view.status != ViewStatus::accepted) continue;
+    ++figures.accepted;
+    const auto known = truth.views.find(view.name);
+    if (known == truth.views.end()) continue;
+    pairs.push_back({view.camera_from_model.rotation(), known->second.rotation()});
+    const auto lens = poses.lens_states.find(view.lens_state);
+    solved[i] = PoseOf{view.camera_from_model, lens != poses.lens_states.end()
+                                                   ? lens->second.intrinsics
+                                                   : photos.intrinsics(photos.photos[i])};
+    calibrated[i] = PoseOf{known->second, truth.intrinsics};
+  }
+  if (pairs.size() < 3)
+    return BadInput("fewer than three accepted views have a calibrated camera", "truth",
+                    "names in the truth are the photographs' base names");
+  const Eigen::Matrix3d alignment = Alignment(pairs);
+  std::vector<double> aligned, neighbour;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Pair &p = pairs[i], &next = pairs[(i + 1) % pairs.size()];
+    aligned.push_back(DegFromRad(AngleBetween(p.calibrated * alignment, p.solved)));
+    neighbour.push_back(DegFromRad(AngleBetween(next.calibrated * p.calibrated.transpose(),
+                                                next.solved * p.solved.transpose())));
+  }
+  figures.aligned_deg = SpreadOf(aligned);
+  figures.neighbour_deg = SpreadOf(neighbour);
+  if (poses.axis_in_camera.size() == 1) {
+    const Eigen::Vector3d& axis = poses.axis_in_camera.begin()->second.direction;
+    figures.axis_deg = DegFromRad(std::asin(std::min(1.0, axis.cross(AxisOf(pairs)).norm())));
+  }
+  figures.lens = MovedLens(poses, photos, truth.intrinsics);
+  const ContourMesh contour_mesh(mesh);
+  figures.contour_px = PooledDistances(contour_mesh, masks, solved);
+  figures.contour_calibrated_px = PooledDistances(contour_mesh, masks, calibrated);
+  return figures;
+}
+
+}  // namespace scan
