@@ -162,6 +162,7 @@ Status Axis::AcceptLateStep(std::int64_t late_ns) {
   }
   base_ns_ += late_ns;
   ++late_shifts_;
+  shifted_ns_ += late_ns;
   return {};
 }
 
@@ -224,6 +225,12 @@ void Axis::SetFault(std::string what) {
   referenced_ = false;
   fault_ = std::move(what);
   Advance(AxisEvent::faulted);
+}
+
+void Axis::CutPower(std::string why) {
+  SetFault(std::move(why));
+  (void)port_->Brake(true);  // a port that does not answer changes nothing: it is a fault already
+  (void)port_->Enable(false);
 }
 
 Result<bool> Axis::HomeSwitch() {

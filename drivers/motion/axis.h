@@ -28,7 +28,9 @@ class Axis {
   const std::string& fault() const { return fault_; }
   AxisReading Reading() const;
   std::int64_t counted_steps() const { return count_; }
+  // Late steps that have shifted the time base, and by how much in all, since the axis was made.
   std::int64_t late_shifts() const { return late_shifts_; }
+  std::int64_t shifted_ns() const { return shifted_ns_; }
 
   // Refuses a target that is not finite, outside the limits, or that this state does not accept.
   // Errors: bad_input; device when the axis is not homed or has a fault.
@@ -59,6 +61,8 @@ class Axis {
   // Edges cease; the position is unknown.
   void Abort();
   void SetFault(std::string what);
+  // Edges cease, the motor loses its current, a brake falls in; a fault until homed again.
+  void CutPower(std::string why);
 
   // The switch that homing looks for.
   Result<bool> HomeSwitch();
@@ -99,6 +103,7 @@ class Axis {
   std::vector<std::int64_t> stop_offsets_ns_;
   std::size_t next_stop_edge_ = 0;
   std::int64_t late_shifts_ = 0;
+  std::int64_t shifted_ns_ = 0;
 };
 
 }  // namespace scan

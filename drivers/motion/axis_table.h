@@ -29,9 +29,6 @@ enum class AxisEvent {
 };
 constexpr std::size_t kAxisEvents = 9;
 
-// How much a fault weighs. `invalid`: the position itself cannot be trusted.
-enum class Alarm { none, minor, major, invalid };
-
 enum class Interlock { cover_open, heartbeat_lost, limit_switch, late_step, emergency_stop };
 constexpr std::size_t kInterlocks = 5;
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <stop_token>
 #include <string>
+#include <string_view>
 
 #include "drivers/base/result.h"
 
@@ -33,6 +34,14 @@ struct StageTarget {
   friend bool operator==(const StageTarget&, const StageTarget&) = default;
 };
 
+// How much a fault weighs. `invalid`: the position itself cannot be trusted.
+enum class Alarm { none, minor, major, invalid };
+
+constexpr std::string_view NameOf(Alarm alarm) {
+  constexpr std::string_view names[] = {"none", "minor", "major", "invalid"};
+  return names[static_cast<int>(alarm)];
+}
+
 enum class AxisState { unpowered, unreferenced, idle, moving, held, fault };
 
 struct HomeReport {
@@ -50,11 +59,13 @@ struct MotionStatus {
   AxisState lift = AxisState::unreferenced;
   int reference_epoch = 0;
   StagePosition position;
-  std::string fault;  // empty when none
+  std::string fault;          // empty when none
+  Alarm alarm = Alarm::none;  // the worst of the interlocks that are up
+  std::string interlocks;     // their names; empty when none
 };
 
-// Thread contract: Home and MoveTo from one thread at a time; Stop, Abort, Status from any thread,
-// also while a move runs. A requested stop token acts like Stop().
+// Thread contract: Home and MoveTo from one thread at a time; Stop, Abort, Acknowledge, ReadStatus
+// from any thread, also while a move runs. A requested stop token acts like Stop().
 // Errors: device faults (limits, lost reference, heartbeat), cancelled after Stop.
 class Motion {
  public:
@@ -67,6 +78,8 @@ class Motion {
   virtual Status Stop() = 0;
   // Edges cease at once; the position is unknown and only homing clears it.
   virtual Status Abort() = 0;
+  // A person has seen the latched alarms; those whose cause is gone go down.
+  virtual Status Acknowledge() { return {}; }
   virtual MotionStatus ReadStatus() = 0;
 };
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <mutex>
 
 namespace scan {
 namespace {
@@ -27,7 +28,8 @@ MotionStatus StepperMotion::ReadStatus() {
   std::lock_guard lock(mutex_);
   std::string fault = parts_.turntable->fault();
   if (fault.empty()) fault = parts_.lift->fault();
-  return {parts_.turntable->state(), parts_.lift->state(), reference_epoch_, Position(), fault};
+  return {parts_.turntable->state(), parts_.lift->state(), reference_epoch_, Position(), fault,
+          interlocks_.alarm(),       interlocks_.Words()};
 }
 
 Status StepperMotion::Stop() {
@@ -57,9 +59,58 @@ Status StepperMotion::Abort() {
   return {};
 }
 
+void StepperMotion::SetInterlock(Interlock interlock, bool present) {
+  std::stop_source wake;
+  {
+    std::lock_guard lock(mutex_);
+    if (!present) {
+      interlocks_.CauseGone(interlock);
+      return;
+    }
+    interlocks_.Raise(interlock);
+    switch (Row(interlock).ends_motion) {
+      case MotionEnd::none:
+        return;
+      case MotionEnd::stop:
+        stopped_by_ = interlock;
+        stop_requested_ = true;
+        break;
+      case MotionEnd::abort:
+        if (!running_) AbortAll();
+        abort_requested_ = true;
+        break;
+      case MotionEnd::power_cut:
+        if (!running_) CutAll();
+        cut_requested_ = true;
+        break;
+    }
+    wake = wake_;
+  }
+  wake.request_stop();
+}
+
+Status StepperMotion::Acknowledge() {
+  std::lock_guard lock(mutex_);
+  interlocks_.Acknowledge();
+  return {};
+}
+
 void StepperMotion::AbortAll() {
   parts_.turntable->Abort();
   parts_.lift->Abort();
+}
+
+void StepperMotion::CutAll() {
+  for (Axis* axis : {parts_.turntable.get(), parts_.lift.get()}) {
+    axis->CutPower(std::string(Row(Interlock::emergency_stop).name));
+  }
+}
+
+std::int64_t StepperMotion::Shifts() const {
+  return parts_.turntable->late_shifts() + parts_.lift->late_shifts();
+}
+std::int64_t StepperMotion::ShiftedNs() const {
+  return parts_.turntable->shifted_ns() + parts_.lift->shifted_ns();
 }
 
 Status StepperMotion::EndAll(std::span<Axis* const> axes) {
@@ -67,18 +118,27 @@ Status StepperMotion::EndAll(std::span<Axis* const> axes) {
   return {};
 }
 
-Error StepperMotion::StoppedError() {
+// Of a motion that did not finish. Precondition: `outcome` is stopped, aborted or power_cut.
+Error StepperMotion::EndError(Outcome outcome) {
+  if (outcome == Outcome::power_cut) {
+    return {ErrorKind::device,
+            "emergency stop: the motors are without power, the position is unknown", "stage",
+            "release it, acknowledge it (scanstation device acknowledge), home the stage"};
+  }
+  if (outcome == Outcome::aborted) {
+    return {ErrorKind::device, "motion was aborted, the position is unknown", "stage",
+            "home the stage"};
+  }
   const StagePosition at = Position();
-  return {
-      ErrorKind::cancelled,
-      fmt::format("motion was stopped at {:.3f} {}, {:.3f} {}", at.turntable_deg.counted,
-                  parts_.turntable->config().unit, at.lift_mm.counted, parts_.lift->config().unit),
-      "stage", "move on when ready"};
-}
-
-Error StepperMotion::AbortedError() {
-  return {ErrorKind::device, "motion was aborted, the position is unknown", "stage",
-          "home the stage"};
+  const std::string where =
+      fmt::format("at {:.3f} {}, {:.3f} {}", at.turntable_deg.counted,
+                  parts_.turntable->config().unit, at.lift_mm.counted, parts_.lift->config().unit);
+  if (stopped_by_) {
+    return {ErrorKind::device,
+            fmt::format("motion was stopped {}: {}", where, Row(*stopped_by_).name), "stage",
+            "remove the cause, then move on"};
+  }
+  return {ErrorKind::cancelled, "motion was stopped " + where, "stage", "move on when ready"};
 }
 
 Result<StepperMotion::Outcome> StepperMotion::Play(std::span<Axis* const> axes, const Trip& trip) {
@@ -88,6 +148,10 @@ Result<StepperMotion::Outcome> StepperMotion::Play(std::span<Axis* const> axes, 
     std::stop_token token;
     {
       std::lock_guard lock(mutex_);
+      if (cut_requested_) {
+        CutAll();
+        return Outcome::power_cut;
+      }
       if (abort_requested_) {
         AbortAll();
         return Outcome::aborted;
@@ -107,11 +171,12 @@ Result<StepperMotion::Outcome> StepperMotion::Play(std::span<Axis* const> axes, 
     // Only this thread changes deadlines.
     if (!parts_.clock->SleepUntil(*next->NextDeadlineNs(), token)) continue;
     std::lock_guard lock(mutex_);
-    if (abort_requested_) continue;
-    Status emitted = next->EmitNext(parts_.clock->Now().mono_ns);
+    if (abort_requested_ || cut_requested_) continue;
+    Status emitted = EmitStep(*next);
     Result<bool> trips = emitted && trip ? trip(*next) : Result<bool>(false);
     if (!emitted || !trips) {
       AbortAll();
+      if (emitted) next->SetFault(trips.error().what);
       return tl::unexpected(emitted ? trips.error() : emitted.error());
     }
     if (*trips) {
@@ -124,12 +189,62 @@ Result<StepperMotion::Outcome> StepperMotion::Play(std::span<Axis* const> axes, 
   return stopping ? Outcome::stopped : tripped ? Outcome::tripped : Outcome::finished;
 }
 
+Status StepperMotion::EmitStep(Axis& axis) {
+  const std::int64_t now_ns = parts_.clock->Now().mono_ns;
+  record_.lateness.Add(now_ns - *axis.NextDeadlineNs());
+  Status emitted = axis.EmitNext(now_ns);
+  if (!emitted && axis.state() == AxisState::fault) {  // the law of late steps
+    interlocks_.Raise(Interlock::late_step);
+    interlocks_.CauseGone(Interlock::late_step);
+  }
+  return emitted;
+}
+
 void StepperMotion::Begin() {
   assert(!running_ && "Home and MoveTo come from one thread at a time");
   running_ = true;
   stop_requested_ = false;
   abort_requested_ = false;
+  cut_requested_ = false;
+  stopped_by_.reset();
+  record_ = MotionRecord();
+  record_.late_shifts = -Shifts();
+  record_.shifted_ns = -ShiftedNs();
   wake_ = std::stop_source();
+}
+
+// Ends what Begin() began, and tells of it.
+template <class T>
+Result<T> StepperMotion::Recorded(const char* what, Result<T> result) {
+  MotionRecord record;
+  {
+    std::lock_guard lock(mutex_);
+    if (!running_) return result;  // refused before anything moved
+    running_ = false;
+    record_.what = what;
+    record_.outcome = result ? "done" : result.error().what;
+    record_.late_shifts += Shifts();
+    record_.shifted_ns += ShiftedNs();
+    record = record_;
+  }
+  if (parts_.on_end) parts_.on_end(record);
+  return result;
+}
+
+Result<HomeReport> StepperMotion::Home(std::stop_token stop) {
+  {
+    std::lock_guard lock(mutex_);
+    if (stop.stop_requested()) return Cancelled("homing");
+    SCAN_CHECK(interlocks_.Permit(AxisCommand::home));
+    Begin();
+    settled_mono_ns_ = 0;
+  }
+  const std::stop_callback on_stop(stop, [this] { (void)Stop(); });
+  return Recorded("home", HomeAll());
+}
+
+Result<MoveReport> StepperMotion::MoveTo(const StageTarget& target, std::stop_token stop) {
+  return Recorded("move", MoveAll(target, stop));
 }
 
 Status StepperMotion::CheckTarget(const StageTarget& target) const {
@@ -151,13 +266,14 @@ Result<bool> StepperMotion::LimitHit(Axis& axis) {
   return axis.HomeSwitch();
 }
 
-Result<MoveReport> StepperMotion::MoveTo(const StageTarget& target, std::stop_token stop) {
+Result<MoveReport> StepperMotion::MoveAll(const StageTarget& target, std::stop_token stop) {
   const std::array axes{parts_.turntable.get(), parts_.lift.get()};
   bool moved = false;
   {
     std::lock_guard lock(mutex_);
     SCAN_CHECK(CheckTarget(target));
-    if (stop.stop_requested()) return tl::unexpected(StoppedError());
+    SCAN_CHECK(interlocks_.Permit(AxisCommand::move));
+    if (stop.stop_requested()) return Cancelled("move");
     if (parts_.aim && parts_.aim->Current() != target.aim_id) {
       SCAN_CHECK(parts_.aim->GoTo(target.aim_id));
       moved = true;
@@ -168,7 +284,6 @@ Result<MoveReport> StepperMotion::MoveTo(const StageTarget& target, std::stop_to
     if (begun) begun = parts_.lift->BeginMove(target.lift_mm, base_ns);
     if (!begun) {
       AbortAll();
-      running_ = false;
       return tl::unexpected(begun.error());
     }
     for (Axis* axis : axes) moved = moved || axis->NextDeadlineNs();
@@ -199,35 +314,40 @@ Result<MoveReport> StepperMotion::FinishMove(const Result<Outcome>& outcome, Axi
     parts_.clock->SleepUntil(settled_ns, token);
     lock.lock();
   }
-  running_ = false;
   if (!outcome) return tl::unexpected(outcome.error());
   if (on_limit) {
+    interlocks_.Raise(Interlock::limit_switch);
+    interlocks_.CauseGone(Interlock::limit_switch);
     on_limit->SetFault("ran onto its limit switch");
     return DeviceFault(on_limit->fault(), on_limit->config().name,
                        "home the stage; check for lost steps, and that the limits of the "
                        "configuration lie inside the switches");
   }
+  if (*outcome == Outcome::power_cut || cut_requested_) {
+    CutAll();
+    return tl::unexpected(EndError(Outcome::power_cut));
+  }
   if (*outcome == Outcome::aborted || abort_requested_) {
     AbortAll();
-    return tl::unexpected(AbortedError());
+    return tl::unexpected(EndError(Outcome::aborted));
   }
-  if (*outcome == Outcome::stopped || stop_requested_) return tl::unexpected(StoppedError());
+  if (*outcome == Outcome::stopped || stop_requested_) {
+    return tl::unexpected(EndError(Outcome::stopped));
+  }
   return MoveReport{Position(), settled_mono_ns_};
 }
 
-Result<HomeReport> StepperMotion::Home(std::stop_token stop) {
-  {
-    std::lock_guard lock(mutex_);
-    if (stop.stop_requested()) return Cancelled("homing");
-    Begin();
-    settled_mono_ns_ = 0;
-  }
-  const std::stop_callback on_stop(stop, [this] { (void)Stop(); });
+Result<HomeReport> StepperMotion::HomeAll() {
   Status homed = HomeAxis(*parts_.lift);
   if (homed) homed = HomeAxis(*parts_.turntable);
   std::lock_guard lock(mutex_);
-  running_ = false;
+  if (cut_requested_ || abort_requested_) {  // perhaps after the last step
+    if (cut_requested_) CutAll();
+    if (abort_requested_) AbortAll();
+    return tl::unexpected(EndError(cut_requested_ ? Outcome::power_cut : Outcome::aborted));
+  }
   if (!homed) return tl::unexpected(homed.error());
+  interlocks_.Homed();
   return HomeReport{++reference_epoch_, Position()};
 }
 
@@ -247,7 +367,9 @@ Result<bool> StepperMotion::Travel(Axis& axis, double distance, double velocity,
              return seen;
            }));
   std::lock_guard lock(mutex_);
-  if (outcome == Outcome::aborted) return tl::unexpected(AbortedError());
+  if (outcome == Outcome::aborted || outcome == Outcome::power_cut || stopped_by_) {
+    return tl::unexpected(EndError(outcome));
+  }
   if (outcome == Outcome::stopped) return Cancelled("homing of " + axis.config().name);
   return seen;
 }

@@ -3,17 +3,29 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <stop_token>
+#include <string>
 
 #include "drivers/base/clock.h"
 #include "drivers/motion/aim_preset.h"
 #include "drivers/motion/axis.h"
+#include "drivers/motion/interlocks.h"
+#include "drivers/motion/lateness.h"
 #include "drivers/motion/motion.h"
+#include "drivers/motion/priority_mutex.h"
 
 namespace scan {
+
+// What a homing or a move was like, for the log.
+struct MotionRecord {
+  std::string what;              // home move
+  std::string outcome;           // done, or the error's words
+  LatenessHistogram lateness;    // of every step against its deadline
+  std::int64_t late_shifts = 0;  // late steps, each of which shifted the rest
+  std::int64_t shifted_ns = 0;   // by so much in all
+};
 
 // Plays the edges of all axes, merged by deadline, on the thread that calls Home or MoveTo.
 // Errors beyond those of Motion: bad_input for a target outside the limits, not a number, or an
@@ -25,6 +37,8 @@ class StepperMotion final : public Motion {
     std::unique_ptr<Axis> turntable;
     std::unique_ptr<Axis> lift;
     std::unique_ptr<AimPreset> aim;  // may be null: the station has none, and aims are ignored
+    // May be empty; called when a homing or a move has ended, on its thread.
+    std::function<void(const MotionRecord&)> on_end;
   };
   explicit StepperMotion(Parts parts);
 
@@ -32,10 +46,13 @@ class StepperMotion final : public Motion {
   Result<MoveReport> MoveTo(const StageTarget& target, std::stop_token stop) override;
   Status Stop() override;
   Status Abort() override;
+  // As Stop() or harder: what the interlock's row says. From any thread, also while a move runs.
+  void SetInterlock(Interlock interlock, bool present);
+  Status Acknowledge() override;
   MotionStatus ReadStatus() override;
 
  private:
-  enum class Outcome { finished, tripped, stopped, aborted };
+  enum class Outcome { finished, tripped, stopped, aborted, power_cut };
   // Asked after every edge; true ramps that axis down.
   using Trip = std::function<Result<bool>(Axis&)>;
 
@@ -43,6 +60,13 @@ class StepperMotion final : public Motion {
   Result<Outcome> Play(std::span<Axis* const> axes, const Trip& trip);
   Status EndAll(std::span<Axis* const> axes);
   void AbortAll();
+  void CutAll();
+  Status EmitStep(Axis& axis);
+  Error EndError(Outcome outcome);
+  Result<HomeReport> HomeAll();
+  Result<MoveReport> MoveAll(const StageTarget& target, std::stop_token stop);
+  template <class T>
+  Result<T> Recorded(const char* what, Result<T> result);
   Result<MoveReport> FinishMove(const Result<Outcome>& outcome, Axis* on_limit, bool moved);
   Result<bool> Travel(Axis& axis, double distance, double velocity, std::optional<bool> until);
   Status HomeAxis(Axis& axis);
@@ -51,14 +75,18 @@ class StepperMotion final : public Motion {
   Status CheckTarget(const StageTarget& target) const;
   Result<bool> LimitHit(Axis& axis);
   StagePosition Position() const;
-  Error StoppedError();
-  Error AbortedError();
+  std::int64_t Shifts() const;
+  std::int64_t ShiftedNs() const;
 
   Parts parts_;
-  std::mutex mutex_;  // guards all below and the axes
+  PriorityMutex mutex_;  // guards all below and the axes
   std::stop_source wake_;
   bool stop_requested_ = false;
   bool abort_requested_ = false;
+  bool cut_requested_ = false;
+  std::optional<Interlock> stopped_by_;
+  Interlocks interlocks_;
+  MotionRecord record_;
   bool running_ = false;
   int reference_epoch_ = 0;
   std::int64_t settled_mono_ns_ = 0;

@@ -54,6 +54,41 @@ Status ValidateAxis(const AxisConfig& axis) {
   return {};
 }
 
+Status ValidateWiring(const AxisConfig& axis, const GpioAxisWiring& wiring) {
+  const auto where = [&](const char* key) {
+    return fmt::format("axis.{}.gpio.{}", axis.name, key);
+  };
+  if (!wiring.step) return BadInput("no step line", where("step"), "name the line");
+  if (!wiring.direction) return BadInput("no direction line", where("direction"), "name the line");
+  if (axis.on_stop == OnStop::brake && !wiring.brake) {
+    return BadInput("on_stop is brake and no brake is wired", where("brake"),
+                    "name its line, or choose another on_stop");
+  }
+  const bool endstop = axis.homing.kind == HomingKind::endstop;
+  if (!(endstop ? wiring.endstop : wiring.index)) {
+    return BadInput("homing looks for a switch that has no line",
+                    where(endstop ? "endstop" : "index"), "name the line");
+  }
+  // The pulse and the pause after it must fit into half of the shortest step.
+  const double step_us = 1e6 / (axis.velocity * axis.steps_per_unit);
+  if (2 * wiring.pulse_us > 0.5 * step_us) {
+    return BadInput(fmt::format("a step lasts {:.1f} us at full velocity", step_us),
+                    where("pulse_us"), "shorten the pulse or lower the velocity");
+  }
+  return {};
+}
+
+Status ValidateGpio(const StationConfig& config) {
+  if (config.motion_driver != MotionDriver::gpio) return {};
+  SCAN_CHECK(ValidateWiring(config.turntable, config.gpio.turntable));
+  SCAN_CHECK(ValidateWiring(config.lift, config.gpio.lift));
+  if (config.lift_geometry.kind == "pitch_axis" && config.aims.size() > 1) {
+    return BadInput("no driver moves the camera's pitch on this station", "axis.lift.kind",
+                    "choose fixed_pitch, arc or manual_aim, or keep one aim");
+  }
+  return {};
+}
+
 template <class Items>
 Status ValidateIds(const Items& items, const char* key) {
   std::set<std::string> seen;
@@ -163,6 +198,7 @@ Status Validate(const StationConfig& config) {
     return BadInput("the lift would fall when it is released", "axis.lift.on_stop",
                     "choose hold or brake, or set self_locking = true if its drive locks itself");
   }
+  SCAN_CHECK(ValidateGpio(config));
   SCAN_CHECK(ValidateIds(config.cameras, "camera"));
   SCAN_CHECK(ValidateIds(config.aims, "aim"));
   const auto& d = config.lift_geometry.direction_in_station;

@@ -11,6 +11,7 @@
 
 #include "drivers/base/result.h"
 #include "drivers/motion/axis_config.h"
+#include "drivers/motion/gpio/gpio_motion_config.h"
 
 namespace scan {
 
@@ -123,8 +124,13 @@ struct SimConfig {
   friend bool operator==(const SimConfig&, const SimConfig&) = default;
 };
 
+// What moves the axes.
+enum class MotionDriver { sim, gpio };
+
 struct StationConfig {
   std::string name = "simulated station";
+  MotionDriver motion_driver = MotionDriver::sim;
+  GpioMotionConfig gpio;  // of the gpio driver
   AxisConfig turntable, lift;
   LiftGeometry lift_geometry;
   std::vector<CameraConfig> cameras;

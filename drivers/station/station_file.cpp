@@ -26,6 +26,42 @@ void ReadHoming(TomlReader& in, HomingConfig& homing) {
   in.Number("max_travel", homing.max_travel, 1e-3, kFar);
 }
 
+void ReadPin(TomlReader& in, const char* key, GpioPin& pin) {
+  std::string text;
+  in.Text(key, text);
+  if (text.empty()) return;
+  if (const auto parsed = ParseGpioPin(text)) {
+    pin = *parsed;
+  } else {
+    in.RefuseValue(key, parsed.error().what, parsed.error().mend);
+  }
+}
+
+void ReadWiring(TomlReader& in, GpioAxisWiring& wiring) {
+  ReadPin(in, "step", wiring.step);
+  ReadPin(in, "direction", wiring.direction);
+  ReadPin(in, "enable", wiring.enable);
+  ReadPin(in, "brake", wiring.brake);
+  ReadPin(in, "endstop", wiring.endstop);
+  ReadPin(in, "index", wiring.index);
+  in.Number("pulse_us", wiring.pulse_us, 0, 1000);
+  in.Number("setup_us", wiring.setup_us, 0, 10'000);
+  in.Number("enable_ms", wiring.enable_ms, 0, 1000);
+}
+
+void ReadMotion(TomlReader& in, StationConfig& config) {
+  if (const auto word = in.Word("driver", {"sim", "gpio"})) {
+    config.motion_driver = static_cast<MotionDriver>(*word);
+  }
+  in.Text("chip", config.gpio.chip);
+  ReadPin(in, "emergency_stop", config.gpio.emergency_stop);
+  ReadPin(in, "cover", config.gpio.cover);
+  in.Integer("priority", config.gpio.real_time.priority, 0, 99);
+  int core = -1;
+  in.Integer("core", core, -1, 1023);
+  if (core >= 0) config.gpio.real_time.core = core;
+}
+
 void ReadAxis(TomlReader& in, AxisConfig& axis) {
   in.Number("steps_per_unit", axis.steps_per_unit, 1e-3, 1e6);
   if (const auto word = in.Word("positive_steps", {"forward", "backward"})) {
@@ -152,9 +188,13 @@ void ReadSim(TomlReader& in, SimConfig& sim) {
 }
 
 void ReadAxes(TomlReader& in, StationConfig& config) {
-  in.Table("turntable", [&](TomlReader& axis) { ReadAxis(axis, config.turntable); });
+  in.Table("turntable", [&](TomlReader& axis) {
+    ReadAxis(axis, config.turntable);
+    axis.Table("gpio", [&](TomlReader& gpio) { ReadWiring(gpio, config.gpio.turntable); });
+  });
   in.Table("lift", [&](TomlReader& axis) {
     ReadAxis(axis, config.lift);
+    axis.Table("gpio", [&](TomlReader& gpio) { ReadWiring(gpio, config.gpio.lift); });
     const std::vector<std::string> kinds{"fixed_pitch", "manual_aim", "arc", "pitch_axis"};
     if (const auto word = axis.Word("kind", kinds)) config.lift_geometry.kind = kinds[*word];
     axis.Vector3("direction_in_station", config.lift_geometry.direction_in_station.data(), -1, 1);
@@ -189,6 +229,7 @@ Result<StationConfig> ParseStationConfig(std::string_view text, const std::strin
   std::optional<Error> error;
   TomlReader in(root, source, "", error);
   in.Text("name", config.name);
+  in.Table("motion", [&](TomlReader& motion) { ReadMotion(motion, config); });
   in.Table("axis", [&](TomlReader& axes) { ReadAxes(axes, config); });
   in.Tables("camera", config.cameras, ReadCamera);
   in.Tables("aim", config.aims, ReadAim);

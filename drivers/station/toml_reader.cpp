@@ -125,6 +125,11 @@ void TomlReader::Vector3(std::string_view key, double* values, double low, doubl
   }
 }
 
+void TomlReader::RefuseValue(std::string_view key, const std::string& what,
+                             const std::string& mend) {
+  if (const toml::node* node = Take(key)) Refuse(*node, key, what, mend);
+}
+
 void TomlReader::RefuseUnknown() {
   if (error_) return;
   for (const auto& [key, node] : table_) {

@@ -68,6 +68,8 @@ class TomlReader {
   }
 
   void RefuseUnknown();
+  // For what only the caller can judge. Precondition: the key was read and is there.
+  void RefuseValue(std::string_view key, const std::string& what, const std::string& mend);
 
  private:
   const toml::node* Take(std::string_view key);

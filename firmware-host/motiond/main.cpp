@@ -6,6 +6,9 @@
 
 #include "drivers/base/clock.h"
 #include "drivers/base/log.h"
+#include "drivers/io/gpio/gpiod_lines.h"
+#include "drivers/motion/gpio/gpio_motion.h"
+#include "drivers/motion/real_time.h"
 #include "drivers/station/sim_station.h"
 #include "drivers/station/station_file.h"
 #include "firmware-host/protocol/motion_server.h"
@@ -13,6 +16,17 @@
 
 namespace scan {
 namespace {
+
+// The one place that names a concrete motion driver.
+Result<std::unique_ptr<Motion>> MakeMotion(const StationConfig& config) {
+  if (config.motion_driver == MotionDriver::gpio) {
+    GpioMotionParts parts{config.turntable, config.lift, config.gpio, {}};
+    for (const AimConfig& aim : config.aims) parts.aim_ids.push_back(aim.id);
+    return MakeGpioMotion(parts, OpenGpiodLines, std::make_shared<RealTimeClock>());
+  }
+  return MakeSimMotion(config, std::make_shared<SimWorld>(config),
+                       std::make_shared<SystemClock>());
+}
 
 Status Serve(const std::filesystem::path& config_path, const std::filesystem::path& socket) {
   sigset_t signals;
@@ -22,9 +36,7 @@ Status Serve(const std::filesystem::path& config_path, const std::filesystem::pa
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread: all inherit it
 
   SCAN_TRY(const StationConfig config, LoadStationConfig(config_path));
-  const std::shared_ptr<Clock> clock = std::make_shared<SystemClock>();
-  const auto world = std::make_shared<SimWorld>(config);
-  const std::unique_ptr<Motion> motion = MakeSimMotion(config, world, clock);
+  SCAN_TRY(const std::unique_ptr<Motion> motion, MakeMotion(config));
   SCAN_TRY(const auto server, RpcServer::Start(socket, MotionFunctions(*motion), kHeartbeatLimit));
   Log(LogLevel::info, "ready", {{"socket", socket.string()}, {"station", config.name}});
   int signal = 0;

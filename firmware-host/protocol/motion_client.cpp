@@ -48,6 +48,11 @@ Status MotionClient::Abort() {
   return {};
 }
 
+Status MotionClient::Acknowledge() {
+  SCAN_CHECK(client_.Call("acknowledge", Json::object(), kHeartbeatLimit));
+  return {};
+}
+
 MotionStatus MotionClient::ReadStatus() {
   const auto answer = client_.Call("status", Json::object(), kHeartbeatLimit);
   if (answer)

@@ -18,6 +18,7 @@ class MotionClient final : public Motion {
   Result<MoveReport> MoveTo(const StageTarget& target, std::stop_token stop) override;
   Status Stop() override;
   Status Abort() override;
+  Status Acknowledge() override;
   MotionStatus ReadStatus() override;
 
  private:

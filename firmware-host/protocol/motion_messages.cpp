@@ -37,6 +37,13 @@ AxisState StateFrom(const Json& json) {
   throw nlohmann::json::other_error::create(501, "unknown axis state " + name, &json);
 }
 
+Alarm AlarmFrom(const Json& json) {
+  const auto name = json.get<std::string>();
+  for (const Alarm alarm : {Alarm::none, Alarm::minor, Alarm::major, Alarm::invalid})
+    if (name == NameOf(alarm)) return alarm;
+  throw nlohmann::json::other_error::create(501, "unknown alarm " + name, &json);
+}
+
 // The one place where nlohmann's exceptions become a Result.
 template <class T, class Read>
 Result<T> Guarded(const char* message, const Json& json, Read read) {
@@ -84,7 +91,9 @@ Json ToJson(const MotionStatus& status) {
           {"lift", AxisStateName(status.lift)},
           {"reference_epoch", status.reference_epoch},
           {"position", ToJson(status.position)},
-          {"fault", status.fault}};
+          {"fault", status.fault},
+          {"alarm", NameOf(status.alarm)},
+          {"interlocks", status.interlocks}};
 }
 
 Result<StageTarget> StageTargetFromJson(const Json& json) {
@@ -107,7 +116,9 @@ Result<MotionStatus> MotionStatusFromJson(const Json& json) {
   return Guarded<MotionStatus>("status", json, [](const Json& j) {
     return MotionStatus{StateFrom(j.at("turntable")), StateFrom(j.at("lift")),
                         j.at("reference_epoch").get<int>(), PositionFrom(j.at("position")),
-                        j.at("fault").get<std::string>()};
+                        j.at("fault").get<std::string>(),
+                        AlarmFrom(j.at("alarm")),
+                        j.at("interlocks").get<std::string>()};
   });
 }
 

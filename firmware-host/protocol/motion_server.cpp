@@ -47,6 +47,8 @@ RpcFunctions MotionFunctions(Motion& motion) {
                        /*immediate=*/true, /*cancels=*/true};
   functions["abort"] = {[&motion](const Json&, std::stop_token) { return Done(motion.Abort()); },
                         /*immediate=*/true, /*cancels=*/true};
+  functions["acknowledge"] = {
+      [&motion](const Json&, std::stop_token) { return Done(motion.Acknowledge()); }};
   functions["status"] = {[&motion](const Json&, std::stop_token) -> Result<Json> {
     return ToJson(motion.ReadStatus());
   }};

@@ -9,7 +9,7 @@ namespace scan {
 // A peer that says nothing for so long has died: its motion is stopped.
 constexpr std::chrono::milliseconds kHeartbeatLimit{2000};
 
-// home, move_to (one at a time); stop, abort, status, heartbeat (answered at once).
+// home, move_to (one at a time); stop, abort, acknowledge, status, heartbeat (answered at once).
 // Precondition: `motion` outlives the functions.
 RpcFunctions MotionFunctions(Motion& motion);
 

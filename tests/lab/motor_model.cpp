@@ -69,8 +69,8 @@ Status DriveLevel(const LabBoard& board, unsigned line, bool high) {
 
 LabMotor LabTurntable(std::int64_t start) {
   LabMotor motor{"turntable", 0, 1, 2, std::nullopt, 3};
-  motor.steps_per_turn = 3600;
-  motor.index_width = 40;
+  motor.steps_per_turn = 36'000;
+  motor.index_width = 200;
   motor.start = start;
   return motor;
 }
@@ -90,6 +90,7 @@ Result<std::unique_ptr<MotorModel>> MotorModel::Start(LabBoard board,
     return Failed(error.message(), trace.string(), "run this in the lab's guest, as root");
   }
   SCAN_CHECK(WriteText(trace / "buffer_size_kb", "8192"));
+  SCAN_CHECK(WriteText(trace / "trace", ""));  // empties it
   SCAN_CHECK(WriteText(trace / "events/gpio/gpio_value/filter", TraceFilter(board, motors)));
   SCAN_CHECK(WriteText(trace / "events/gpio/gpio_value/enable", "1"));
 
@@ -179,7 +180,7 @@ void MotorModel::DriveSwitch(Motor& motor, unsigned line, bool high) {
   if (before != motor.driven.end() && before->second == high) return;
   motor.driven[line] = high;
   if (motor.fault == SwitchFault::bounces) {
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 20; ++k) {
       (void)DriveLevel(board_, line, high);
       (void)DriveLevel(board_, line, !high);
     }

@@ -18,7 +18,7 @@ level() { cat "$GPIO_SYSFS/sim_gpio$1/value"; }
 "$LAB_BIN/lab_toggle" scan-lab 4 150
 [ "$(counted | sed -n 2p)" = "lift 0 400 1" ]
 [ "$(level 8)" = 1 ]
-"$LAB_BIN/lab_toggle" scan-lab 0 1234
+"$LAB_BIN/lab_toggle" scan-lab 0 1234 # one turn is 36000
 [ "$(counted | sed -n 1p)" = "turntable 0 1234 1" ]
 [ "$(level 3)" = 1 ] # index
 exec 3>&-

@@ -102,7 +102,42 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"[[plan.rings]]\naim = 'a0'\ncount = 2.5", "whole number", "s.toml:3"},
         BadCase{"[sim]\nformat = 'bmp'", "none of its words", "s.toml:2"},
         BadCase{"[sim.errors]\nlevel = 'none'", "none of its words", "s.toml:2"},
+        BadCase{"[motion]\ndriver = 'gpio'", "no step line", "s.toml:1"},
+        BadCase{"[motion]\nemergency_stop = '!'", "is no line", "s.toml:2"},
+        BadCase{"[motion]\npriority = 100", "out of range", "s.toml:2"},
+        BadCase{"[axis.lift.gpio]\nstep = 4", "is not a text", "s.toml:2"},
+        BadCase{"[axis.lift.gpio]\nsteps = 'A'", "unknown key axis.lift.gpio.steps", "s.toml:2"},
         BadCase{"[axis.turntable.homing]\nslow = 9", "above self_start", "s.toml:2"}));
+
+TEST(StationFile, TheStationsOfRealLinesAreValidAndReadWhole) {
+  const auto lab = LoadStationConfig(SCAN_SOURCE_DIR "/configs/station-lab.toml");
+  ASSERT_TRUE(lab) << ToString(lab.error());
+  EXPECT_EQ(lab->motion_driver, MotionDriver::gpio);
+  EXPECT_EQ(lab->gpio.chip, "scan-lab");
+  EXPECT_EQ(lab->gpio.emergency_stop, (GpioPin{"ESTOP", false, GpioBias::as_is}));
+  EXPECT_EQ(lab->gpio.lift.enable, (GpioPin{"LIFT_EN", true, GpioBias::as_is}));
+  EXPECT_EQ(lab->gpio.real_time.core, std::nullopt);
+  EXPECT_EQ(lab->turntable.self_start * lab->turntable.steps_per_unit, 5000);
+  const auto pi = LoadStationConfig(SCAN_SOURCE_DIR "/configs/station-rpi5.toml");
+  ASSERT_TRUE(pi) << ToString(pi.error());
+  EXPECT_EQ(pi->gpio.chip, "pinctrl-rp1");
+  EXPECT_EQ(pi->gpio.emergency_stop.bias, GpioBias::pull_up);
+  EXPECT_EQ(pi->gpio.real_time.core, 3);
+}
+
+TEST(StationFile, AWiringMustFitTheAxis) {
+  const std::string lab = ReadTextFile(SCAN_SOURCE_DIR "/configs/station-lab.toml").value();
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string text = lab;
+    text.replace(text.find(from), from.size(), to);
+    const auto read = ParseStationConfig(text, "lab.toml");
+    return read ? std::string() : read.error().what;
+  };
+  EXPECT_THAT(refusal("brake = \"LIFT_BRAKE\"", ""), HasSubstr("no brake is wired"));
+  EXPECT_THAT(refusal("index = \"TURNTABLE_INDEX\"", ""), HasSubstr("no line"));
+  EXPECT_THAT(refusal("pulse_us = 3.0", "pulse_us = 300.0"), HasSubstr("full velocity"));
+  EXPECT_EQ(refusal("core = -1", "core = 1"), "");
+}
 
 TEST(StationFile, AFileThatIsNotThereIsBadInput) {
   const auto read = LoadStationConfig("/nonexistent/station.toml");
