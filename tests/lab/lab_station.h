@@ -34,11 +34,12 @@ struct LabStation {
     return station;
   }
 
-  // Turned by hand to where Make() had them.
+  // Turned by hand to where Make() had them, long enough ago for the driver to have seen it.
   void TurnBack() const {
     EXPECT_TRUE(motors->Sync());
     EXPECT_TRUE(motors->Turn("turntable", -400 - motors->State("turntable").position));
     EXPECT_TRUE(motors->Turn("lift", 300 - motors->State("lift").position));
+    clock->SleepFor(300'000'000);
   }
 
   std::unique_ptr<Motion> MakeMotion(const GpioOpener& open = OpenGpiodLines) const {

@@ -239,7 +239,7 @@ TEST_F(MotionLaws, ABrokenEndstopIsAClearFault) {
   for (const auto& broken : cases) {
     station.TurnBack();
     ASSERT_TRUE(station.motors->Break("lift", broken.fault));
-    station.clock->SleepFor(200'000'000);  // the edges arrive
+    station.clock->SleepFor(300'000'000);  // the edges arrive
     const auto homed = motion->Home({});
     ASSERT_FALSE(homed) << broken.words;
     EXPECT_EQ(homed.error().kind, ErrorKind::device);

@@ -177,9 +177,11 @@ void MotorModel::DriveSwitch(Motor& motor, unsigned line, bool high) {
   if (motor.fault == SwitchFault::stuck_high) high = true;
   if (motor.fault == SwitchFault::disconnected) high = false;
   const auto before = motor.driven.find(line);
-  if (before != motor.driven.end() && before->second == high) return;
+  const bool changed = before == motor.driven.end() || before->second != high;
+  const bool bounces = motor.fault == SwitchFault::bounces && (changed || high);
+  if (!changed && !bounces) return;
   motor.driven[line] = high;
-  if (motor.fault == SwitchFault::bounces) {
+  if (bounces) {
     for (int k = 0; k < 20; ++k) {
       (void)DriveLevel(board_, line, high);
       (void)DriveLevel(board_, line, !high);

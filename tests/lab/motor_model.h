@@ -48,6 +48,7 @@ struct LabMotor {
 LabMotor LabTurntable(std::int64_t start);
 LabMotor LabLift(std::int64_t start);
 
+// A switch that bounces does so at every step while it is pressed.
 enum class SwitchFault { works, stuck_high, disconnected, bounces };
 
 struct LabMotorState {

@@ -50,15 +50,16 @@ Status GpioStepPort::SetControl(std::optional<std::size_t> line, bool active) {
 }
 
 Status GpioStepPort::Enable(bool on) {
-  if (on == enabled_) return {};
-  SCAN_CHECK(SetControl(enable_line_, on));
-  enabled_ = on;
-  if (on) {
+  if (on) {  // a new motion: what the switches did before is past
     for (const auto& input : {switches_.endstop, switches_.index}) {
       if (input) switches_.watch->Forgive(*input);
     }
-    settled_ns_ = std::max(settled_ns_, clock_->Now().mono_ns + NsFromUs(wiring_.enable_ms * 1e3));
   }
+  if (on == enabled_) return {};
+  SCAN_CHECK(SetControl(enable_line_, on));
+  enabled_ = on;
+  const std::int64_t ready_ns = clock_->Now().mono_ns + NsFromUs(wiring_.enable_ms * 1e3);
+  if (on) settled_ns_ = std::max(settled_ns_, ready_ns);
   return {};
 }
 

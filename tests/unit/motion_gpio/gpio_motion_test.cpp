@@ -50,10 +50,16 @@ struct Bench {
     parts.gpio.chip = "board";
     parts.gpio.real_time.priority = 0;
     parts.gpio.emergency_stop = {"ESTOP", false, GpioBias::as_is};
-    parts.gpio.turntable = {
-        .step = {"TS"}, .direction = {"TD"}, .enable = {"TE", true}, .index = {"INDEX"}};
-    parts.gpio.lift = {
-        .step = {"LS"}, .direction = {"LD"}, .enable = {"LE", true}, .endstop = {"ENDSTOP"}};
+    GpioAxisWiring& turntable = parts.gpio.turntable;
+    turntable.step = {"TS"};
+    turntable.direction = {"TD"};
+    turntable.enable = {"TE", true};
+    turntable.index = {"INDEX"};
+    GpioAxisWiring& lift = parts.gpio.lift;
+    lift.step = {"LS"};
+    lift.direction = {"LD"};
+    lift.enable = {"LE", true};
+    lift.endstop = {"ENDSTOP"};
     parts.aim_ids = {"a0"};
   }
   std::unique_ptr<Motion> Make() {
