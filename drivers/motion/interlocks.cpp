@@ -52,7 +52,7 @@ Status Interlocks::Permit(AxisCommand command) const {
     return DeviceFault("interlock: " + std::string(row.name), "stage",
                        homing_mends  ? "remove the cause, then home the stage"
                        : row.latched ? "remove the cause, acknowledge it "
-                                       "(scanstation device acknowledge), then home the stage"
+                                       "(scanstation device motion acknowledge), then home the stage"
                                      : "remove the cause");
   }
   return {};

@@ -123,7 +123,7 @@ Error StepperMotion::EndError(Outcome outcome) {
   if (outcome == Outcome::power_cut) {
     return {ErrorKind::device,
             "emergency stop: the motors are without power, the position is unknown", "stage",
-            "release it, acknowledge it (scanstation device acknowledge), home the stage"};
+            "release it, acknowledge it (scanstation device motion acknowledge), home the stage"};
   }
   if (outcome == Outcome::aborted) {
     return {ErrorKind::device, "motion was aborted, the position is unknown", "stage",

@@ -12,6 +12,8 @@ void AddAllCommands(CommandSet& commands) {
   AddReplay(commands);
   AddVerify(commands);
   AddImport(commands);
+  AddMotionDevices(commands);
+  AddDoctor(commands);
 #ifdef SCAN_RECONSTRUCTION
   AddSurface(commands);
   AddAtlas(commands);

@@ -35,7 +35,22 @@ class CommandSet {
   explicit CommandSet(CLI::App& app) : app_(app) {}
 
   CLI::App& Add(const std::string& name, const std::string& description, CommandFn run) {
-    CLI::App* command = app_.add_subcommand(name, description);
+    return AddTo(app_, name, description, std::move(run));
+  }
+
+  // A subcommand that only holds others; null: at the top. Found again when it is there already.
+  CLI::App& AddGroup(CLI::App* parent, const std::string& name, const std::string& description) {
+    CLI::App& above = parent ? *parent : app_;
+    const auto same = [&](const CLI::App* other) { return other->get_name() == name; };
+    if (const auto there = above.get_subcommands(same); !there.empty()) return *there.front();
+    CLI::App* group = above.add_subcommand(name, description);
+    group->require_subcommand(1);
+    return *group;
+  }
+
+  CLI::App& AddTo(CLI::App& parent, const std::string& name, const std::string& description,
+                  CommandFn run) {
+    CLI::App* command = parent.add_subcommand(name, description);
     command->add_flag("--json", json_, "machine-readable results on standard output");
     command->add_flag("-v,--verbose", verbose_, "more on standard error");
     command->callback([this, run = std::move(run)] { chosen_ = run; });

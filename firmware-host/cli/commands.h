@@ -12,6 +12,12 @@ void AddCapture(CommandSet& commands);
 void AddResume(CommandSet& commands);
 void AddStationControl(CommandSet& commands);  // status stop pause continue
 
+// motion_commands.cpp: device motion ..., device gpio ...
+void AddMotionDevices(CommandSet& commands);
+
+// doctor_command.cpp
+void AddDoctor(CommandSet& commands);
+
 // session_commands.cpp
 void AddReplay(CommandSet& commands);
 void AddVerify(CommandSet& commands);

@@ -38,7 +38,7 @@ Result<std::vector<unsigned>> OffsetsOn(const GpioChipInfo& chip, const GpioRequ
     const std::string where = fmt::format("gpio {}/{}", chip.label, line.name);
     if (found.empty()) {
       return DeviceFault("the chip has no such line", where,
-                         "name one that 'scanstation device list' shows, or its number");
+                         "name one that 'scanstation device gpio list' shows, or its number");
     }
     if (found.size() > 1) {
       return DeviceFault(fmt::format("{} lines of the chip have this name", found.size()), where,
@@ -71,7 +71,7 @@ Result<GpioPlace> FindGpioLines(std::span<const GpioChipInfo> chips, const GpioR
                        fmt::format("gpio {}", request.chip.empty() && !request.lines.empty()
                                                   ? request.lines.front().name
                                                   : request.chip),
-                       "give the label of a chip that 'scanstation device list' shows, and check "
+                       "give the label of a chip that 'scanstation device gpio list' shows, and check "
                        "that this user may open /dev/gpiochip*");
   }
   if (candidates.size() > 1) {

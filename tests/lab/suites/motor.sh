@@ -1,7 +1,7 @@
 # The motor model counts what the kernel's own tools set, and moves the switches.
 . "$LAB_DIR/guest/gpio.sh"
 mkfifo ask
-"$LAB_BIN/lab_motor" state <ask >ready &
+"$LAB_BIN/lab_motor" state 1234 400 <ask >ready &
 exec 3>ask
 until [ -s ready ]; do sleep 0.1; done
 counted() { # waits for the model to have seen all that was set

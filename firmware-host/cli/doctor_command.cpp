@@ -1,0 +1,162 @@
+// scanstation doctor: what motion on this machine has, what it lacks, how to mend it.
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <thread>
+
+#include "drivers/io/gpio/gpiod_lines.h"
+#include "drivers/motion/real_time.h"
+#include "drivers/station/station_file.h"
+#include "firmware-host/cli/commands.h"
+
+namespace scan {
+namespace {
+
+enum class Verdict { good, hint, bad };
+
+struct Finding {
+  Verdict verdict = Verdict::good;
+  std::string subject, what, mend;
+};
+
+constexpr const char* kVerdictNames[] = {"good", "hint", "bad"};
+
+void CheckChips(std::vector<Finding>& findings, bool needed) {
+  const auto chips = ListGpiodChips();
+  std::string labels;
+  for (const GpioChipInfo& chip : chips) labels += (labels.empty() ? "" : ", ") + chip.label;
+  if (!chips.empty()) {
+    findings.push_back(
+        {Verdict::good, "gpio", fmt::format("libgpiod {}; chips: {}", GpiodVersion(), labels), ""});
+    return;
+  }
+  findings.push_back(
+      {needed ? Verdict::bad : Verdict::hint, "gpio",
+       fmt::format("libgpiod {}; no chip that this user may open", GpiodVersion()),
+       "add this user to the group that owns /dev/gpiochip* (gpio), or use a station "
+       "without GPIO"});
+}
+
+std::vector<GpioPin> PinsOf(const GpioMotionConfig& gpio) {
+  std::vector<GpioPin> pins{gpio.emergency_stop, gpio.cover};
+  for (const GpioAxisWiring* axis : {&gpio.turntable, &gpio.lift}) {
+    for (const GpioPin& pin :
+         {axis->step, axis->direction, axis->enable, axis->brake, axis->endstop, axis->index}) {
+      pins.push_back(pin);
+    }
+  }
+  std::erase_if(pins, [](const GpioPin& pin) { return !pin; });
+  return pins;
+}
+
+// Looks only: a line that is taken may well be held by the running scanstation-motiond.
+void CheckLines(std::vector<Finding>& findings, const GpioMotionConfig& gpio) {
+  GpioRequest request{gpio.chip, "", {}};
+  for (const GpioPin& pin : PinsOf(gpio)) request.lines.push_back({pin.name});
+  const auto chips = ListGpiodChips();
+  const auto place = FindGpioLines(chips, request);
+  if (!place) {
+    findings.push_back({Verdict::bad, "lines", ToString(place.error()), place.error().mend});
+    return;
+  }
+  const GpioChipInfo& chip = chips[place->chip];
+  findings.push_back({Verdict::good, "lines",
+                      fmt::format("all {} lines are on {}", request.lines.size(), chip.label), ""});
+  for (std::size_t k = 0; k < place->offsets.size(); ++k) {
+    const GpioLineInfo& line = chip.lines[place->offsets[k]];
+    if (!line.used || line.consumer.starts_with("scanstation")) continue;
+    findings.push_back({Verdict::bad, "lines",
+                        fmt::format("{} is held by '{}'", request.lines[k].name, line.consumer),
+                        "end that program, or free the pin from its function"});
+  }
+}
+
+// Raspberry Pi kernels keep driving lines whose program has died, unless told otherwise.
+void CheckRelease(std::vector<Finding>& findings) {
+  for (const char* driver : {"pinctrl_rp1", "pinctrl_bcm2835"}) {
+    std::ifstream in(fmt::format("/sys/module/{}/parameters/persist_gpio_outputs", driver));
+    char kept = 0;
+    if (!(in >> kept)) continue;
+    if (kept == 'Y' || kept == '1') {
+      findings.push_back({Verdict::hint, "lines after exit",
+                          "the kernel keeps driving lines whose program has died: motors stay "
+                          "energised then",
+                          "add dtparam=strict_gpiod to config.txt and wire pull-ups to the enable "
+                          "lines, or make sure that energised motors do no harm"});
+    } else {
+      findings.push_back({Verdict::good, "lines after exit", "released to their pull", ""});
+    }
+  }
+}
+
+void CheckRealTime(std::vector<Finding>& findings, const RealTimeOptions& options) {
+  if (options.core && *options.core >= static_cast<int>(std::thread::hardware_concurrency())) {
+    findings.push_back({Verdict::bad, "real time",
+                        fmt::format("there is no core {}", *options.core),
+                        "choose another motion.core"});
+  }
+  if (options.priority == 0) {
+    findings.push_back({Verdict::hint, "real time",
+                        "switched off: steps come late on a busy machine",
+                        "set motion.priority to 50"});
+    return;
+  }
+  RealTimeGrant grant;
+  RealTimeOptions trial = options;
+  trial.core.reset();
+  std::thread([&] { grant = BecomeRealTime(trial); }).join();
+  if (grant.mend.empty()) {
+    findings.push_back({Verdict::good, "real time", "scheduling and locked memory granted", ""});
+  } else {
+    findings.push_back({Verdict::hint, "real time", "not granted to this user", grant.mend});
+  }
+}
+
+Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
+  std::vector<Finding> findings;
+  StationConfig config;
+  if (!config_path.empty()) {
+    const auto read = LoadStationConfig(config_path);
+    if (!read) {
+      findings.push_back({Verdict::bad, "station file", ToString(read.error()), read.error().mend});
+    } else {
+      config = *read;
+      findings.push_back({Verdict::good, "station file", config.name, ""});
+    }
+  }
+  const bool gpio = config.motion_driver == MotionDriver::gpio;
+  CheckChips(findings, gpio);
+  if (gpio) CheckLines(findings, config.gpio);
+  CheckRelease(findings);
+  CheckRealTime(findings, config.gpio.real_time);
+
+  CommandOutput output{{{"findings", Json::array()}}, ""};
+  bool bad = false;
+  for (const Finding& finding : findings) {
+    const char* verdict = kVerdictNames[static_cast<int>(finding.verdict)];
+    bad = bad || finding.verdict == Verdict::bad;
+    output.json["findings"].push_back({{"verdict", verdict},
+                                       {"subject", finding.subject},
+                                       {"what", finding.what},
+                                       {"mend", finding.mend}});
+    output.text += fmt::format("{:<5} {:<17} {}\n", verdict, finding.subject, finding.what);
+    if (!finding.mend.empty()) output.text += fmt::format("{:>24}mend: {}\n", "", finding.mend);
+  }
+  output.json["ready"] = !bad;
+  return output;
+}
+
+}  // namespace
+
+void AddDoctor(CommandSet& commands) {
+  auto config = std::make_shared<std::filesystem::path>();
+  commands
+      .Add("doctor", "What this machine has and lacks for a station, and how to mend it",
+           [config](const CliContext&) { return RunDoctor(*config); })
+      .add_option("--config", *config, "station file whose devices are looked for");
+}
+
+}  // namespace scan
