@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 #include <gpiod.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
+
+#include "drivers/io/gpio/gpiod_lines.h"
 
 namespace {
 
@@ -29,20 +33,23 @@ std::string ChipPath(const std::string& label) {
   return {};
 }
 
+// Pulses a second.
 template <class Set>
-void Pulse(long count, Set set) {
+double Pulse(long count, Set set) {
   const auto from = std::chrono::steady_clock::now();
   for (long k = 0; k < count; ++k) {
     set(true);
     set(false);
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - from;
-  fmt::print("{:.0f} pulses/s\n", static_cast<double>(count) / took.count());
+  return static_cast<double>(count) / took.count();
 }
 
-bool Run(const std::string& path, unsigned offset, long count) {
+// 0 when the line cannot be taken.
+double BareRate(const std::string& path, unsigned offset, long count) {
   gpiod_chip* chip = gpiod_chip_open(path.c_str());
-  if (!chip) return false;
+  if (!chip) return 0;
+  double rate = 0;
 #if SCAN_GPIOD_MAJOR >= 2
   gpiod_line_settings* settings = gpiod_line_settings_new();
   gpiod_line_settings_set_direction(settings, GPIOD_LINE_DIRECTION_OUTPUT);
@@ -50,7 +57,7 @@ bool Run(const std::string& path, unsigned offset, long count) {
   gpiod_line_config_add_line_settings(config, &offset, 1, settings);
   gpiod_line_request* request = gpiod_chip_request_lines(chip, nullptr, config);
   if (request) {
-    Pulse(count, [&](bool high) {
+    rate = Pulse(count, [&](bool high) {
       gpiod_line_request_set_value(request, offset,
                                    high ? GPIOD_LINE_VALUE_ACTIVE : GPIOD_LINE_VALUE_INACTIVE);
     });
@@ -58,27 +65,53 @@ bool Run(const std::string& path, unsigned offset, long count) {
   }
   gpiod_line_config_free(config);
   gpiod_line_settings_free(settings);
-  const bool done = request != nullptr;
 #else
   gpiod_line* line = gpiod_chip_get_line(chip, offset);
-  const bool done = line && gpiod_line_request_output(line, "lab_toggle", 0) == 0;
-  if (done) Pulse(count, [&](bool high) { gpiod_line_set_value(line, high); });
+  if (line && gpiod_line_request_output(line, "lab_toggle", 0) == 0) {
+    rate = Pulse(count, [&](bool high) { gpiod_line_set_value(line, high); });
+  }
 #endif
   gpiod_chip_close(chip);
-  return done;
+  return rate;
+}
+
+double DriverRate(const std::string& label, unsigned offset, long count) {
+  const auto lines = scan::OpenGpiodLines({label, "lab_toggle", {{std::to_string(offset), true}}});
+  if (!lines) return 0;
+  const scan::GpioLevel levels[] = {{0, false}, {0, true}};
+  return Pulse(count, [&](bool high) { (void)(*lines)->Set({&levels[high ? 1 : 0], 1}); });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    fmt::print(stderr, "usage: lab_toggle LABEL LINE COUNT\n");
+  if (argc != 4 && argc != 5) {
+    fmt::print(stderr, "usage: lab_toggle LABEL LINE COUNT [PAIRS]\n");
     return 2;
   }
   const std::string path = ChipPath(argv[1]);
-  if (path.empty() || !Run(path, static_cast<unsigned>(std::atoi(argv[2])), std::atol(argv[3]))) {
+  const auto line = static_cast<unsigned>(std::atoi(argv[2]));
+  const long count = std::atol(argv[3]);
+  const double first = path.empty() ? 0 : BareRate(path, line, count);
+  if (first == 0) {
     fmt::print(stderr, "lab_toggle: no chip '{}' with a free line {}\n", argv[1], argv[2]);
     return 1;
   }
+  if (argc == 4) {
+    fmt::print("{:.0f} pulses/s\n", first);
+    return 0;
+  }
+  std::vector<double> bare, ratios;
+  for (int k = 0; k < std::atoi(argv[4]); ++k) {
+    bare.push_back(BareRate(path, line, count));
+    ratios.push_back(DriverRate(argv[1], line, count) / bare.back());
+  }
+  std::sort(bare.begin(), bare.end());
+  std::sort(ratios.begin(), ratios.end());
+  const std::size_t middle = ratios.size() / 2;
+  fmt::print(
+      "figure: pulses through the driver {:.2f} of a bare libgpiod loop's {:.0f}/s (median of "
+      "{})\n",
+      ratios[middle], bare[middle], ratios.size());
   return 0;
 }
