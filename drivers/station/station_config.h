@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/base/result.h"
+#include "drivers/camera/v4l2/v4l2_config.h"
 #include "drivers/motion/axis_config.h"
 #include "drivers/motion/gpio/gpio_motion_config.h"
 
@@ -32,9 +33,14 @@ struct LensConfig {
   friend bool operator==(const LensConfig&, const LensConfig&) = default;
 };
 
+// What gives the pictures.
+enum class CameraDriver { sim, v4l2 };
+
 struct CameraConfig {
   std::string id = "c0";
   std::string model = "simulated camera";
+  CameraDriver driver = CameraDriver::sim;
+  V4l2Config v4l2;  // of the v4l2 driver
   int w = 1848, h = 1224;
   double azimuth_deg = -90;  // where the camera stands, about the turntable axis from station +x
   LensConfig lens;

@@ -98,10 +98,28 @@ void ReadLens(TomlReader& in, LensConfig& lens) {
   in.Number("k3", lens.k3, -50, 50);
 }
 
+void ReadV4l2(TomlReader& in, V4l2Config& v4l2) {
+  in.Text("port", v4l2.port);
+  in.Text("name", v4l2.name);
+  in.Text("pixel_format", v4l2.pixel_format);
+  in.Number("frame_interval_ms", v4l2.frame_interval_ms, 0, 60'000);
+  in.Flag("lock_automatics", v4l2.lock_automatics);
+  in.Number("unity_gain", v4l2.unity_gain, 0, 65'536);
+  in.Integer("latency_frames", v4l2.latency_frames, 0, 16);
+  in.Integer("settings_frames", v4l2.settings_frames, 0, 16);
+  in.Number("timeout_ms", v4l2.timeout_ms, 100, 60'000);
+  in.Number("reconnect_ms", v4l2.reconnect_ms, 0, 600'000);
+  in.Table("controls", [&](TomlReader& controls) { controls.Scalars(v4l2.controls); });
+}
+
 CameraConfig ReadCamera(TomlReader& in) {
   CameraConfig camera = DefaultSimStation().cameras.front();
   in.Text("id", camera.id);
   in.Text("model", camera.model);
+  if (const auto word = in.Word("driver", {"sim", "v4l2"})) {
+    camera.driver = static_cast<CameraDriver>(*word);
+  }
+  in.Table("v4l2", [&](TomlReader& v4l2) { ReadV4l2(v4l2, camera.v4l2); });
   in.Integer("width_px", camera.w, 16, 20'000);
   in.Integer("height_px", camera.h, 16, 20'000);
   in.Number("azimuth_deg", camera.azimuth_deg, -360, 360);

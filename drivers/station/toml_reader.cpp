@@ -130,6 +130,22 @@ void TomlReader::RefuseValue(std::string_view key, const std::string& what,
   if (const toml::node* node = Take(key)) Refuse(*node, key, what, mend);
 }
 
+void TomlReader::Scalars(std::map<std::string, std::string>& values) {
+  for (const auto& [key, node] : table_) {
+    const std::string name(key.str());
+    if (!Take(name)) return;
+    if (const auto* text = node.as_string())
+      values[name] = text->get();
+    else if (const auto* number = node.as_integer())
+      values[name] = std::to_string(number->get());
+    else if (const auto* flag = node.as_boolean())
+      values[name] = flag->get() ? "true" : "false";
+    else
+      Refuse(node, name, "is neither a whole number nor true, false or a text",
+             "give one of these; 'scanstation device camera controls' shows the choices");
+  }
+}
+
 void TomlReader::RefuseUnknown() {
   if (error_) return;
   for (const auto& [key, node] : table_) {

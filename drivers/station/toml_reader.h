@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -30,6 +31,8 @@ class TomlReader {
   void Text(std::string_view key, std::string& value);
   // One of some words; gives its place among them.
   std::optional<std::size_t> Word(std::string_view key, const std::vector<std::string>& words);
+  // Every key of the table, whatever its name, as text: whole numbers, true, false and texts.
+  void Scalars(std::map<std::string, std::string>& values);
   void Vector3(std::string_view key, double* values, double low, double high);
 
   // A table below this one, read by `read(TomlReader&)`; its own unknown keys are refused.

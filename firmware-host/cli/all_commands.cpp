@@ -12,6 +12,7 @@ void AddAllCommands(CommandSet& commands) {
   AddReplay(commands);
   AddVerify(commands);
   AddImport(commands);
+  AddCameraDevices(commands);
   AddMotionDevices(commands);
   AddDoctor(commands);
 #ifdef SCAN_RECONSTRUCTION

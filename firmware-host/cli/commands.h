@@ -18,6 +18,9 @@ void AddMotionDevices(CommandSet& commands);
 // doctor_command.cpp
 void AddDoctor(CommandSet& commands);
 
+// device_commands.cpp: device camera list|grab|controls|set
+void AddCameraDevices(CommandSet& commands);
+
 // session_commands.cpp
 void AddReplay(CommandSet& commands);
 void AddVerify(CommandSet& commands);

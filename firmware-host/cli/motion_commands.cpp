@@ -196,7 +196,8 @@ void AddGpio(CommandSet& commands, CLI::App& device) {
 }  // namespace
 
 void AddMotionDevices(CommandSet& commands) {
-  CLI::App& device = commands.AddGroup(nullptr, "device", "Devices tried by hand");
+  CLI::App& device =
+      commands.AddGroup(nullptr, "device", "Devices tried by hand; no daemon may be using them");
   AddMotion(commands, device);
   AddGpio(commands, device);
 }

@@ -70,6 +70,11 @@ Result<TruthSink> MakeTruthSink(const std::filesystem::path& path) {
 
 Result<std::unique_ptr<SimHost>> SimHost::Start(StationConfig config,
                                                 const std::filesystem::path& truth) {
+  for (const CameraConfig& camera : config.cameras) {
+    if (camera.driver != CameraDriver::sim)
+      return BadInput("camera " + camera.id + " is a real one, and the axes are simulated",
+                      "camera.driver", "simulate the camera too: driver = \"sim\"");
+  }
   SCAN_TRY(const SimScene scene, MakeSimScene(config.sim.specimen));
   SCAN_TRY(TruthSink truth_sink, MakeTruthSink(truth));
   PlaceOnFoot(config, scene.specimen_bounds);

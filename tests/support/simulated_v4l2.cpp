@@ -289,6 +289,7 @@ void SimulatedV4l2::Deliver(const Flying& frame) {
   const bool at_start =
       (options_.stamp_flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   std::int64_t stamp_ns = at_start ? frame.first_bytes_ns : frame.complete_ns;
+  stamp_ns += options_.stamp_ahead_ns;
   if (fault == FrameFault::stale_stamp) stamp_ns -= 10 * options_.interval_ns;
   if (fault == FrameFault::future_stamp) stamp_ns += 3'600'000'000'000;
   done.timestamp.tv_sec = stamp_ns / 1'000'000'000;

@@ -56,6 +56,7 @@ struct SimulatedV4l2Options {
   int held_frames = 1;     // frame intervals between the exposure and the first bytes
   int settings_delay = 2;  // frames until a new exposure applies
   std::uint32_t stamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+  std::int64_t stamp_ahead_ns = 0;
   std::uint32_t colorspace = V4L2_COLORSPACE_SRGB, ycbcr_enc = 0, quantization = 0;
   int line_padding = 0;  // bytes
   bool huffman_tables = true;

@@ -87,10 +87,10 @@ Result<bool> NextEntry(V4l2Device& device, unsigned long request, const char* na
   return true;
 }
 
-Status ListSizes(V4l2Device& device, OfferedFormat& format) {
+Status ListSizes(V4l2Device& device, bool intervals, OfferedFormat& format) {
   const auto add = [&](std::uint32_t w, std::uint32_t h) {
     FrameSize size{static_cast<int>(w), static_cast<int>(h), {}};
-    size.intervals_ns = ListIntervals(device, format.fourcc, size.w, size.h);
+    if (intervals) size.intervals_ns = ListIntervals(device, format.fourcc, size.w, size.h);
     format.sizes.push_back(std::move(size));
   };
   for (std::uint32_t i = 0;; ++i) {
@@ -182,7 +182,7 @@ std::size_t PictureBytes(const PixelFormat& format, int w, int h, int bytes_per_
   return line * lines;
 }
 
-Result<std::vector<OfferedFormat>> ListFormats(V4l2Device& device) {
+Result<std::vector<OfferedFormat>> ListFormats(V4l2Device& device, bool intervals) {
   std::vector<OfferedFormat> offered;
   for (std::uint32_t i = 0;; ++i) {
     v4l2_fmtdesc entry{};
@@ -193,7 +193,7 @@ Result<std::vector<OfferedFormat>> ListFormats(V4l2Device& device) {
     OfferedFormat format;
     format.fourcc = entry.pixelformat;
     format.description = reinterpret_cast<const char*>(entry.description);
-    SCAN_CHECK(ListSizes(device, format));
+    SCAN_CHECK(ListSizes(device, intervals, format));
     offered.push_back(std::move(format));
   }
 }

@@ -45,8 +45,9 @@ struct OfferedFormat {
   int min_w = 0, min_h = 0, step_w = 0, step_h = 0;
 };
 
-// Everything the device offers, also what is not understood here. Errors: device.
-Result<std::vector<OfferedFormat>> ListFormats(V4l2Device& device);
+// Everything the device offers, also what is not understood here; frame intervals only on request
+// (some drivers list hundreds). Errors: device.
+Result<std::vector<OfferedFormat>> ListFormats(V4l2Device& device, bool intervals);
 
 struct FormatWish {
   std::string format;            // empty: any

@@ -264,12 +264,13 @@ ExposureBound V4l2Camera::BoundOf(const MappedFrame& frame) const {
   // Without an exposure time: it is no longer than the time between two frames.
   const std::int64_t frame_ns = FrameTimeNs();
   const std::int64_t exposure_ns = applied_.exposure_us ? ExposureNs() : frame_ns;
+  const std::int64_t stamp_ns = std::min(frame.stamp_ns, frame.taken_ns);
   std::int64_t first_bytes_ns = frame.arrived_after_ns - frame_ns;
-  if (frame.stamp == StampKind::start_of_frame) first_bytes_ns = frame.stamp_ns;
-  if (frame.stamp == StampKind::end_of_frame) first_bytes_ns = frame.stamp_ns - frame_ns;
+  if (frame.stamp == StampKind::start_of_frame) first_bytes_ns = stamp_ns;
+  if (frame.stamp == StampKind::end_of_frame) first_bytes_ns = stamp_ns - frame_ns;
   ExposureBound bound;
   bound.not_before_ns = first_bytes_ns - exposure_ns - options_.config.latency_frames * frame_ns;
-  bound.not_after_ns = frame.stamp == StampKind::end_of_frame ? frame.stamp_ns : frame.taken_ns;
+  bound.not_after_ns = frame.stamp == StampKind::end_of_frame ? stamp_ns : frame.taken_ns;
   bound.source = ExposureSource::sensor;
   return bound;
 }
@@ -278,9 +279,10 @@ bool V4l2Camera::FollowsThePrevious(const MappedFrame& frame) {
   const bool first = !last_sequence_;
   const auto ahead =
       first ? 1 : static_cast<std::int32_t>(frame.sequence - *last_sequence_);  // wraps
+  // Some drivers compute a stamp ahead, within the frame (vivid: the end that is to be expected).
   const bool stamped = frame.stamp != StampKind::none;
   if (ahead <= 0 || (stamped && frame.stamp_ns <= last_stamp_ns_) ||
-      (stamped && frame.stamp_ns > frame.taken_ns))
+      (stamped && frame.stamp_ns > frame.taken_ns + FrameTimeNs()))
     return false;
   sequence_ =
       first ? sequence_base_ + frame.sequence : sequence_ + static_cast<std::uint64_t>(ahead);

@@ -148,7 +148,10 @@ Result<std::int64_t> ReadControl(V4l2Device& device, const V4l2Control& control)
   value.id = control.id;
   v4l2_ext_controls controls = OneControl(value);
   SCAN_CHECK(device.Call(VIDIOC_G_EXT_CTRLS, "reading " + control.name, &controls));
-  return control.type == ControlType::integer64 ? value.value64 : std::int64_t{value.value};
+  if (control.type == ControlType::integer64) return std::int64_t{value.value64};  // packed: copied
+  if (control.type == ControlType::bitmask)
+    return std::int64_t{static_cast<std::uint32_t>(value.value)};
+  return std::int64_t{value.value};
 }
 
 Result<std::int64_t> WriteControl(V4l2Device& device, const V4l2Control& control,

@@ -101,7 +101,7 @@ V4l2Stream::~V4l2Stream() {
 }
 
 Status V4l2Stream::SetFormat(const FormatWish& wish) {
-  SCAN_TRY(const auto offered, ListFormats(device_));
+  SCAN_TRY(const auto offered, ListFormats(device_, false));
   SCAN_TRY(const FormatChoice choice, ChooseFormat(offered, wish, device_.Where()));
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;

@@ -19,6 +19,7 @@ struct TimingCase {
   const char* name;
   int held_frames, latency_frames;
   std::uint32_t stamp_flags;
+  std::int64_t stamp_ahead_ns = 0;
 };
 
 class V4l2Timing : public ::testing::TestWithParam<TimingCase> {};
@@ -27,6 +28,7 @@ TEST_P(V4l2Timing, TheTrueExposureBeginsAfterTheCallAndWithinTheBound) {
   SimulatedV4l2Options simulated;
   simulated.held_frames = GetParam().held_frames;
   simulated.stamp_flags = GetParam().stamp_flags;
+  simulated.stamp_ahead_ns = GetParam().stamp_ahead_ns;
   V4l2CameraOptions options;
   options.config.latency_frames = GetParam().latency_frames;
   V4l2Bench bench(simulated, options);
@@ -52,6 +54,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(TimingCase{"uvc", 1, 1, kMono | V4L2_BUF_FLAG_TSTAMP_SRC_SOE},
                       TimingCase{"prompt", 0, 0, kMono | V4L2_BUF_FLAG_TSTAMP_SRC_SOE},
                       TimingCase{"end_of_frame", 1, 1, kMono},
+                      TimingCase{"stamped_ahead", 1, 1, kMono, 6'000'000},
                       TimingCase{"slow", 3, 3, kMono | V4L2_BUF_FLAG_TSTAMP_SRC_SOE},
                       TimingCase{"unstamped", 1, 1, 0}),
     [](const auto& instance) { return std::string(instance.param.name); });
