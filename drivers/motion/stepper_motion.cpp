@@ -338,15 +338,21 @@ Result<MoveReport> StepperMotion::FinishMove(const Result<Outcome>& outcome, Axi
 }
 
 Result<HomeReport> StepperMotion::HomeAll() {
-  Status homed = HomeAxis(*parts_.lift);
-  if (homed) homed = HomeAxis(*parts_.turntable);
+  Axis* axis = parts_.lift.get();
+  Status homed = HomeAxis(*axis);
+  if (homed) homed = HomeAxis(*(axis = parts_.turntable.get()));
   std::lock_guard lock(mutex_);
   if (cut_requested_ || abort_requested_) {  // perhaps after the last step
     if (cut_requested_) CutAll();
     if (abort_requested_) AbortAll();
     return tl::unexpected(EndError(cut_requested_ ? Outcome::power_cut : Outcome::aborted));
   }
-  if (!homed) return tl::unexpected(homed.error());
+  if (!homed) {
+    // A switch that could not be read, such as one that keeps bouncing, is a fault as any other.
+    const bool own = homed.error().kind == ErrorKind::device && !stopped_by_;
+    if (own && axis->state() != AxisState::fault) axis->SetFault(homed.error().what);
+    return tl::unexpected(homed.error());
+  }
   interlocks_.Homed();
   return HomeReport{++reference_epoch_, Position()};
 }
