@@ -408,6 +408,15 @@ Status StepperMotion::HomeAxis(Axis& axis) {
   return FindEdgeSlowly(axis, !active);
 }
 
+void StepperMotion::SleepFor(std::int64_t duration_ns) {
+  std::stop_token token;
+  {
+    std::lock_guard lock(mutex_);
+    token = wake_.get_token();
+  }
+  parts_.clock->SleepUntil(parts_.clock->Now().mono_ns + duration_ns, token);
+}
+
 // Goes slowly over the switch's edge in the sense of `approach`, so that backlash plays no part,
 // and twice: a switch that bounces or wanders shows as two counts.
 Status StepperMotion::FindEdgeSlowly(Axis& axis, bool ran_into) {
@@ -425,6 +434,7 @@ Status StepperMotion::FindEdgeSlowly(Axis& axis, bool ran_into) {
       SCAN_TRY([[maybe_unused]] const bool unused,
                Travel(axis, -config.approach * distance, homing.fast, std::nullopt));
     }
+    SleepFor(config.settle_ns);  // for the switch, and for news of it to arrive
     bool active = false;
     {
       std::lock_guard lock(mutex_);

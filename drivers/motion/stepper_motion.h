@@ -70,6 +70,7 @@ class StepperMotion final : public Motion {
   Result<MoveReport> FinishMove(const Result<Outcome>& outcome, Axis* on_limit, bool moved);
   Result<bool> Travel(Axis& axis, double distance, double velocity, std::optional<bool> until);
   Status HomeAxis(Axis& axis);
+  void SleepFor(std::int64_t duration_ns);  // less when a stop comes
   Status FindEdgeSlowly(Axis& axis, bool ran_into);
   Status HomingFault(Axis& axis, const std::string& what, const std::string& mend);
   Status CheckTarget(const StageTarget& target) const;

@@ -24,7 +24,9 @@ AxisConfig SmallAxis(const char* name, HomingKind kind, int direction) {
   axis.velocity = 400;  // a start at any rate: the machine may be busy, a late step only shifts
   axis.acceleration = 4000;
   axis.self_start = 400;
-  axis.homing = {kind, direction, 0, 200, 100, 1, 30};
+  // Slow beside the milliseconds that news of a switch takes on a busy machine.
+  axis.homing = {kind, direction, 0, 20, 3, 1.5, 30};
+  axis.settle_ns = 100'000'000;
   return axis;
 }
 
