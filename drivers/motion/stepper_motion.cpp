@@ -213,6 +213,17 @@ void StepperMotion::Begin() {
   wake_ = std::stop_source();
 }
 
+// An emergency stop or an abort that came while no edges were played. With the lock held.
+std::optional<Error> StepperMotion::EndHard() {
+  if (cut_requested_) {
+    CutAll();
+    return EndError(Outcome::power_cut);
+  }
+  if (!abort_requested_) return std::nullopt;
+  AbortAll();
+  return EndError(Outcome::aborted);
+}
+
 // Ends what Begin() began, and tells of it.
 template <class T>
 Result<T> StepperMotion::Recorded(const char* what, Result<T> result) {
@@ -220,6 +231,8 @@ Result<T> StepperMotion::Recorded(const char* what, Result<T> result) {
   {
     std::lock_guard lock(mutex_);
     if (!running_) return result;  // refused before anything moved
+    // Until now SetInterlock and Abort leave it to this thread, whatever else went wrong with it.
+    if (auto hard = EndHard()) result = tl::unexpected(*std::move(hard));
     running_ = false;
     record_.what = what;
     record_.outcome = result ? "done" : result.error().what;
@@ -323,14 +336,7 @@ Result<MoveReport> StepperMotion::FinishMove(const Result<Outcome>& outcome, Axi
                        "home the stage; check for lost steps, and that the limits of the "
                        "configuration lie inside the switches");
   }
-  if (*outcome == Outcome::power_cut || cut_requested_) {
-    CutAll();
-    return tl::unexpected(EndError(Outcome::power_cut));
-  }
-  if (*outcome == Outcome::aborted || abort_requested_) {
-    AbortAll();
-    return tl::unexpected(EndError(Outcome::aborted));
-  }
+  if (const auto hard = EndHard()) return tl::unexpected(*hard);
   if (*outcome == Outcome::stopped || stop_requested_) {
     return tl::unexpected(EndError(Outcome::stopped));
   }
@@ -342,11 +348,7 @@ Result<HomeReport> StepperMotion::HomeAll() {
   Status homed = HomeAxis(*axis);
   if (homed) homed = HomeAxis(*(axis = parts_.turntable.get()));
   std::lock_guard lock(mutex_);
-  if (cut_requested_ || abort_requested_) {  // perhaps after the last step
-    if (cut_requested_) CutAll();
-    if (abort_requested_) AbortAll();
-    return tl::unexpected(EndError(cut_requested_ ? Outcome::power_cut : Outcome::aborted));
-  }
+  if (const auto hard = EndHard()) return tl::unexpected(*hard);  // perhaps after the last step
   if (!homed) {
     // A switch that could not be read, such as one that keeps bouncing, is a fault as any other.
     const bool own = homed.error().kind == ErrorKind::device && !stopped_by_;

@@ -63,6 +63,7 @@ class StepperMotion final : public Motion {
   void CutAll();
   Status EmitStep(Axis& axis);
   Error EndError(Outcome outcome);
+  std::optional<Error> EndHard();
   Result<HomeReport> HomeAll();
   Result<MoveReport> MoveAll(const StageTarget& target, std::stop_token stop);
   template <class T>

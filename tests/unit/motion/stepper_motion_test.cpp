@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <thread>
+#include <utility>
 
 #include "drivers/base/rng.h"
 #include "drivers/base/units.h"
@@ -296,6 +299,64 @@ TEST(StepperMotion, EveryFailingEdgeIsAFaultAndNeverAWrongPosition) {
     EXPECT_FALSE(bench.motion->MoveTo({1, 1, "a0"}, {}));
     ASSERT_TRUE(bench.motion->Home({}));  // the line works again
     EXPECT_TRUE(bench.motion->MoveTo({1, 1, "a0"}, {}));
+  }
+}
+
+// Does something before an edge, which may fail it.
+class HookedPort final : public StepPort {
+ public:
+  HookedPort(std::shared_ptr<AxisPhysics> physics, std::function<Status()> before_edge)
+      : inner_(std::move(physics), "hooked"), before_edge_(std::move(before_edge)) {}
+  Status Enable(bool on) override { return inner_.Enable(on); }
+  Status Brake(bool on) override { return inner_.Brake(on); }
+  Status SetDirection(bool positive) override { return inner_.SetDirection(positive); }
+  Status EmitEdge(std::int64_t deadline_ns) override {
+    SCAN_CHECK(before_edge_());
+    return inner_.EmitEdge(deadline_ns);
+  }
+  Result<bool> Endstop() override { return inner_.Endstop(); }
+  Result<bool> Index() override { return inner_.Index(); }
+
+ private:
+  SimStepPort inner_;
+  std::function<Status()> before_edge_;
+};
+
+TEST(StepperMotion, AnEmergencyStopBesideAnotherFaultStillCutsThePower) {
+  Bench bench;
+  std::thread presser;
+  const auto press_and_fail = [&]() -> Status {
+    std::atomic<bool> pressing = false;
+    presser = std::thread([&] {
+      pressing = true;  // then waits for the lock that the stepping thread holds
+      bench.motion->SetInterlock(Interlock::emergency_stop, true);
+    });
+    while (!pressing) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return DeviceFault("the line is gone", "hooked", "home the stage");
+  };
+  bool armed = false;
+  StepperMotion::Parts parts;
+  parts.clock = bench.clock;
+  parts.turntable = std::make_unique<Axis>(
+      bench.config.turntable, std::make_unique<HookedPort>(bench.turntable, [&]() -> Status {
+        return std::exchange(armed, false) ? press_and_fail() : Status();
+      }));
+  parts.lift =
+      std::make_unique<Axis>(bench.config.lift, std::make_unique<SimStepPort>(bench.lift, "lift"));
+  bench.motion = std::make_unique<StepperMotion>(std::move(parts));
+  for (const bool homing : {false, true}) {
+    ASSERT_TRUE(bench.motion->Home({}));
+    armed = true;
+    const bool done =
+        homing ? bool(bench.motion->Home({})) : bool(bench.motion->MoveTo({90, 0, "a0"}, {}));
+    presser.join();
+    EXPECT_FALSE(done);
+    EXPECT_FALSE(bench.turntable->powered) << homing;
+    EXPECT_FALSE(bench.lift->powered) << homing;
+    EXPECT_THAT(bench.motion->ReadStatus().fault, HasSubstr("emergency stop"));
+    bench.motion->SetInterlock(Interlock::emergency_stop, false);
+    ASSERT_TRUE(bench.motion->Acknowledge());
   }
 }
 
