@@ -48,12 +48,11 @@ std::string Interlocks::Words() const {
 Status Interlocks::Permit(AxisCommand command) const {
   for (const InterlockRow& row : kInterlockTable) {
     if (!IsUp(row.interlock) || !Forbids(row.interlock, command)) continue;
-    const bool homing_mends = !Forbids(row.interlock, AxisCommand::home);
-    return DeviceFault("interlock: " + std::string(row.name), "stage",
-                       homing_mends  ? "remove the cause, then home the stage"
-                       : row.latched ? "remove the cause, acknowledge it "
-                                       "(scanstation device motion acknowledge), then home the stage"
-                                     : "remove the cause");
+    std::string mend = "remove the cause";
+    if (row.latched && Forbids(row.interlock, AxisCommand::home))
+      mend += ", acknowledge it (scanstation device motion acknowledge)";
+    if (row.alarm == Alarm::invalid) mend += ", then home the stage";
+    return DeviceFault("interlock: " + std::string(row.name), "stage", std::move(mend));
   }
   return {};
 }

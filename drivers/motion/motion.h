@@ -64,9 +64,9 @@ struct MotionStatus {
   std::string interlocks;     // their names; empty when none
 };
 
-// Thread contract: Home and MoveTo from one thread at a time; Stop, Abort, Acknowledge, ReadStatus
-// from any thread, also while a move runs. A requested stop token acts like Stop().
-// Errors: device faults (limits, lost reference, heartbeat), cancelled after Stop.
+// Thread contract: Home and MoveTo from one thread at a time; Stop, Abort, LoseHeartbeat,
+// Acknowledge, ReadStatus from any thread, also while a move runs. A requested stop token acts like
+// Stop(). Errors: device faults (limits, lost reference, heartbeat), cancelled after Stop.
 class Motion {
  public:
   virtual ~Motion() = default;
@@ -78,6 +78,9 @@ class Motion {
   virtual Status Stop() = 0;
   // Edges cease at once; the position is unknown and only homing clears it.
   virtual Status Abort() = 0;
+  // Whoever asked for the motion that runs has died or fallen silent. Call before its stop token is
+  // requested, so that the alarm says why.
+  virtual Status LoseHeartbeat() { return Stop(); }
   // A person has seen the latched alarms; those whose cause is gone go down.
   virtual Status Acknowledge() { return {}; }
   virtual MotionStatus ReadStatus() = 0;

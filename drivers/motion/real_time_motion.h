@@ -24,6 +24,7 @@ class RealTimeMotion final : public Motion {
   Result<MoveReport> MoveTo(const StageTarget& target, std::stop_token stop) override;
   Status Stop() override { return inner_->Stop(); }
   Status Abort() override { return inner_->Abort(); }
+  Status LoseHeartbeat() override { return inner_->LoseHeartbeat(); }
   Status Acknowledge() override { return inner_->Acknowledge(); }
   MotionStatus ReadStatus() override { return inner_->ReadStatus(); }
 

@@ -89,6 +89,12 @@ void StepperMotion::SetInterlock(Interlock interlock, bool present) {
   wake.request_stop();
 }
 
+Status StepperMotion::LoseHeartbeat() {
+  SetInterlock(Interlock::heartbeat_lost, true);
+  SetInterlock(Interlock::heartbeat_lost, false);  // latched: a person finds it
+  return {};
+}
+
 Status StepperMotion::Acknowledge() {
   std::lock_guard lock(mutex_);
   interlocks_.Acknowledge();
@@ -136,7 +142,10 @@ Error StepperMotion::EndError(Outcome outcome) {
   if (stopped_by_) {
     return {ErrorKind::device,
             fmt::format("motion was stopped {}: {}", where, Row(*stopped_by_).name), "stage",
-            "remove the cause, then move on"};
+            Row(*stopped_by_).latched
+                ? "remove the cause, acknowledge it (scanstation device motion "
+                  "acknowledge), then move on"
+                : "remove the cause, then move on"};
   }
   return {ErrorKind::cancelled, "motion was stopped " + where, "stage", "move on when ready"};
 }

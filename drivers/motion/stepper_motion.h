@@ -48,6 +48,7 @@ class StepperMotion final : public Motion {
   Status Abort() override;
   // As Stop() or harder: what the interlock's row says. From any thread, also while a move runs.
   void SetInterlock(Interlock interlock, bool present);
+  Status LoseHeartbeat() override;
   Status Acknowledge() override;
   MotionStatus ReadStatus() override;
 

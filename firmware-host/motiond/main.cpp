@@ -12,7 +12,6 @@
 #include "drivers/station/sim_station.h"
 #include "drivers/station/station_file.h"
 #include "firmware-host/protocol/motion_server.h"
-#include "firmware-host/protocol/rpc_server.h"
 
 namespace scan {
 namespace {
@@ -24,8 +23,7 @@ Result<std::unique_ptr<Motion>> MakeMotion(const StationConfig& config) {
     for (const AimConfig& aim : config.aims) parts.aim_ids.push_back(aim.id);
     return MakeGpioMotion(parts, OpenGpiodLines, std::make_shared<RealTimeClock>());
   }
-  return MakeSimMotion(config, std::make_shared<SimWorld>(config),
-                       std::make_shared<SystemClock>());
+  return MakeSimMotion(config, std::make_shared<SimWorld>(config), std::make_shared<SystemClock>());
 }
 
 Status Serve(const std::filesystem::path& config_path, const std::filesystem::path& socket) {
@@ -37,7 +35,7 @@ Status Serve(const std::filesystem::path& config_path, const std::filesystem::pa
 
   SCAN_TRY(const StationConfig config, LoadStationConfig(config_path));
   SCAN_TRY(const std::unique_ptr<Motion> motion, MakeMotion(config));
-  SCAN_TRY(const auto server, RpcServer::Start(socket, MotionFunctions(*motion), kHeartbeatLimit));
+  SCAN_TRY(const auto server, ListenForMotion(socket, *motion));
   Log(LogLevel::info, "ready", {{"socket", socket.string()}, {"station", config.name}});
   int signal = 0;
   sigwait(&signals, &signal);

@@ -57,12 +57,21 @@ RpcFunctions MotionFunctions(Motion& motion) {
   return functions;
 }
 
-void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop) {
-  ServeConnection(channel, MotionFunctions(motion), kHeartbeatLimit, stop);
-  const MotionStatus status = motion.ReadStatus();
-  if (status.turntable == AxisState::moving || status.lift == AxisState::moving)
+std::function<void()> OnPeerLost(Motion& motion) {
+  return [&motion] {
     Log(LogLevel::warning, "peer_lost_while_moving", {{"action", "stop"}});
+    (void)motion.LoseHeartbeat();
+  };
+}
+
+void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop) {
+  ServeConnection(channel, MotionFunctions(motion), kHeartbeatLimit, stop, OnPeerLost(motion));
   (void)motion.Stop();
+}
+
+Result<std::unique_ptr<RpcServer>> ListenForMotion(const std::filesystem::path& socket,
+                                                   Motion& motion) {
+  return RpcServer::Start(socket, MotionFunctions(motion), kHeartbeatLimit, OnPeerLost(motion));
 }
 
 }  // namespace scan

@@ -2,18 +2,27 @@
 #pragma once
 
 #include "drivers/motion/motion.h"
-#include "firmware-host/protocol/rpc.h"
+#include "firmware-host/protocol/rpc_server.h"
 
 namespace scan {
 
-// A peer that says nothing for so long has died: its motion is stopped.
+// A peer that says nothing for so long has died: the motion that it asked for is stopped.
 constexpr std::chrono::milliseconds kHeartbeatLimit{2000};
 
 // home, move_to (one at a time); stop, abort, acknowledge, status, heartbeat (answered at once).
 // Precondition: `motion` outlives the functions.
 RpcFunctions MotionFunctions(Motion& motion);
 
-// Serves one peer; when it goes or falls silent while something moves, the motion is stopped.
+// Logs that the peer whose motion runs has gone or fallen silent, and raises that interlock.
+// Precondition: `motion` outlives the function.
+std::function<void()> OnPeerLost(Motion& motion);
+
+// Serves one peer; when it ends, a motion that runs is stopped.
 void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop);
+
+// Listens on a Unix socket for many peers. Precondition: `motion` outlives the server.
+// Errors: as RpcServer::Start.
+Result<std::unique_ptr<RpcServer>> ListenForMotion(const std::filesystem::path& socket,
+                                                   Motion& motion);
 
 }  // namespace scan

@@ -27,9 +27,12 @@ struct RpcFunction {
 using RpcFunctions = std::map<std::string, RpcFunction>;
 
 // Serves one connection until the peer closes it or `stop` is requested. `silence_limit` ends the
-// connection when the peer sends nothing for so long (0: no limit): the heartbeat.
-// Thread contract: blocks its thread; starts one more for calls that are not immediate.
+// connection when the peer sends nothing for so long (0: no limit): the heartbeat. `on_lost` (may
+// be empty) is told, before the call's token is requested, of a peer that went or fell silent
+// during a call that is not immediate and that nothing has cancelled. Thread contract: blocks its
+// thread, which also calls `on_lost`; starts one more for calls that are not immediate.
 void ServeConnection(Channel& channel, const RpcFunctions& functions,
-                     std::chrono::milliseconds silence_limit, std::stop_token stop);
+                     std::chrono::milliseconds silence_limit, std::stop_token stop,
+                     const std::function<void()>& on_lost = {});
 
 }  // namespace scan

@@ -60,6 +60,12 @@ class SlowLane {
     return true;
   }
 
+  // A call waits or runs, and nothing has cancelled it.
+  bool Working() {
+    const std::lock_guard lock(mutex_);
+    return (job_ || busy_) && !job_stop_.stop_requested();
+  }
+
   void CancelJob() {
     std::stop_source current;  // requested outside the lock: callbacks may take their time
     {
@@ -144,30 +150,34 @@ Error ErrorFromJson(const Json& json) {
 }
 
 void ServeConnection(Channel& channel, const RpcFunctions& functions,
-                     std::chrono::milliseconds silence_limit, std::stop_token stop) {
+                     std::chrono::milliseconds silence_limit, std::stop_token stop,
+                     const std::function<void()>& on_lost) {
   SlowLane slow(channel);
   auto last_heard = std::chrono::steady_clock::now();
   while (!stop.stop_requested()) {
     auto request = channel.Receive(kPollInterval);
-    if (!request) return;
+    if (!request) break;
     const auto now = std::chrono::steady_clock::now();
     if (!*request) {
-      if (silence_limit.count() > 0 && now - last_heard > silence_limit) return;
+      if (silence_limit.count() > 0 && now - last_heard > silence_limit) break;
       continue;
     }
     last_heard = now;
-    if (!Dispatch(**request, functions, channel, slow, stop)) return;
+    if (!Dispatch(**request, functions, channel, slow, stop)) break;
   }
+  if (on_lost && !stop.stop_requested() && slow.Working()) on_lost();
 }
 
 Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::filesystem::path& path,
                                                     RpcFunctions functions,
-                                                    std::chrono::milliseconds silence_limit) {
+                                                    std::chrono::milliseconds silence_limit,
+                                                    std::function<void()> on_lost) {
   std::unique_ptr<RpcServer> server(new RpcServer);
   SCAN_TRY(server->listener_, ListenUnix(path));
   server->path_ = path;
   server->functions_ = std::move(functions);
   server->silence_limit_ = silence_limit;
+  server->on_lost_ = std::move(on_lost);
   server->acceptor_ =
       std::jthread([raw = server.get()](std::stop_token stop) { raw->AcceptLoop(stop); });
   return server;
@@ -195,7 +205,7 @@ void RpcServer::AcceptLoop(std::stop_token stop) {
     if (!fd || connections_.size() >= kMaxConnections) continue;
     Connection& connection = connections_.emplace_back(std::move(fd));
     connection.thread = std::jthread([this, &connection](std::stop_token connection_stop) {
-      ServeConnection(connection.channel, functions_, silence_limit_, connection_stop);
+      ServeConnection(connection.channel, functions_, silence_limit_, connection_stop, on_lost_);
       connection.channel.Close();
       const std::lock_guard lock(mutex_);
       connection.ended = true;

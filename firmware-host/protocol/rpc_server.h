@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -16,10 +17,12 @@ namespace scan {
 // At most 16 connections at a time; a further one is closed at once.
 class RpcServer {
  public:
-  // Errors: as ListenUnix.
+  // The functions and `on_lost` serve every connection (see ServeConnection). Errors: as
+  // ListenUnix.
   static Result<std::unique_ptr<RpcServer>> Start(const std::filesystem::path& path,
                                                   RpcFunctions functions,
-                                                  std::chrono::milliseconds silence_limit);
+                                                  std::chrono::milliseconds silence_limit,
+                                                  std::function<void()> on_lost = {});
   ~RpcServer();  // ends all connections, removes the socket file
 
  private:
@@ -38,6 +41,7 @@ class RpcServer {
   UniqueFd listener_;
   RpcFunctions functions_;
   std::chrono::milliseconds silence_limit_{0};
+  std::function<void()> on_lost_;
   std::mutex mutex_;
   std::list<Connection> connections_;
   std::jthread acceptor_;

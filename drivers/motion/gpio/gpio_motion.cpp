@@ -40,6 +40,7 @@ class WatchedMotion final : public Motion {
   }
   Status Stop() override { return inner_->Stop(); }
   Status Abort() override { return inner_->Abort(); }
+  Status LoseHeartbeat() override { return inner_->LoseHeartbeat(); }
   Status Acknowledge() override { return inner_->Acknowledge(); }
   MotionStatus ReadStatus() override { return inner_->ReadStatus(); }
   ~WatchedMotion() override { watch_->Deafen(); }

@@ -214,6 +214,28 @@ TEST(StepperMotion, AfterAStopThePositionIsKnownToTheStep) {
   }
 }
 
+TEST(StepperMotion, ALostHeartbeatEndsTheMoveAsItsRowSays) {
+  Bench bench;
+  ASSERT_TRUE(bench.motion->Home({}));
+  bench.ZeroCounts();
+  const auto moved = MoveWith(bench, 1111, [&] { EXPECT_TRUE(bench.motion->LoseHeartbeat()); });
+  ASSERT_FALSE(moved);
+  EXPECT_EQ(moved.error().kind, ErrorKind::device);
+  EXPECT_THAT(moved.error().what, HasSubstr("heartbeat lost"));
+  const MotionStatus status = bench.motion->ReadStatus();
+  EXPECT_EQ(status.alarm, Alarm::major);
+  EXPECT_EQ(status.interlocks, "heartbeat lost");
+  EXPECT_EQ(bench.turntable->steps,
+            bench.ReportedSteps(status.position.turntable_deg, bench.config.turntable));
+  EXPECT_LT(bench.turntable->steps, 12'000);
+  const auto refused = bench.motion->MoveTo({20, 10, "a0"}, {});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().mend, HasSubstr("acknowledge"));
+  EXPECT_FALSE(bench.motion->Home({}));
+  ASSERT_TRUE(bench.motion->Acknowledge());
+  EXPECT_TRUE(bench.motion->MoveTo({20, 10, "a0"}, {})) << "the position stayed known";
+}
+
 TEST(StepperMotion, ARequestedTokenStopsToo) {
   Bench bench;
   ASSERT_TRUE(bench.motion->Home({}));

@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <condition_variable>
 
 #include "firmware-host/protocol/motion_client.h"
 #include "firmware-host/protocol/motion_messages.h"
 #include "firmware-host/protocol/motion_server.h"
 #include "firmware-host/protocol/socket.h"
+#include "tests/support/temp_folder.h"
 
 namespace scan {
 namespace {
@@ -34,6 +36,10 @@ class EndlessMotion final : public Motion {
     return {};
   }
   Status Abort() override { return Stop(); }
+  Status LoseHeartbeat() override {
+    ++lost;
+    return Stop();
+  }
   MotionStatus ReadStatus() override {
     const std::lock_guard lock(mutex_);
     MotionStatus status;
@@ -47,6 +53,7 @@ class EndlessMotion final : public Motion {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return moving_; });
   }
+  std::atomic<int> lost = 0;
   int stops() {
     const std::lock_guard lock(mutex_);
     return stops_;
@@ -111,7 +118,30 @@ TEST(MotionProtocol, APeerThatDiesWhileMovingStopsTheMotion) {
   mover.join();
   wire.server.join();
   EXPECT_GE(wire.motion.stops(), 1);
+  EXPECT_EQ(wire.motion.lost, 1);
   EXPECT_EQ(wire.client->ReadStatus().turntable, AxisState::fault);
+}
+
+TEST(MotionProtocol, OnlyTheLossOfTheClientThatMovesStopsTheMotion) {
+  TempFolder folder;
+  const auto socket = folder.path() / "motion";
+  EndlessMotion motion;
+  const auto server = ListenForMotion(socket, motion);
+  ASSERT_TRUE(server) << ToString(server.error());
+  Channel mover(std::move(*ConnectUnix(socket)));
+  {
+    MotionClient onlooker(std::move(*ConnectUnix(socket)));
+    ASSERT_TRUE(mover.Send(
+        {{"id", 1}, {"call", "move_to"}, {"params", ToJson(StageTarget{.turntable_deg = 10})}}));
+    motion.WaitUntilMoving();
+    EXPECT_EQ(onlooker.ReadStatus().turntable, AxisState::moving);
+  }
+  MotionClient other(std::move(*ConnectUnix(socket)));
+  EXPECT_EQ(other.ReadStatus().turntable, AxisState::moving);
+  EXPECT_EQ(motion.lost, 0);
+  mover.Close();
+  while (other.ReadStatus().turntable == AxisState::moving) std::this_thread::yield();
+  EXPECT_EQ(motion.lost, 1);
 }
 
 TEST(MotionProtocol, MalformedMessagesNameTheField) {

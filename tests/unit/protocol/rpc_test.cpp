@@ -43,12 +43,13 @@ struct Served {
     channel = std::make_unique<Channel>(std::move(pair->first));
     peer = std::move(pair->second);
     thread = std::jthread([this, silence_limit](std::stop_token stop) {
-      ServeConnection(*channel, TestFunctions(), silence_limit, stop);
+      ServeConnection(*channel, TestFunctions(), silence_limit, stop, [this] { ++lost; });
       channel->Close();
     });
   }
   std::unique_ptr<Channel> channel;
   UniqueFd peer;
+  std::atomic<int> lost = 0;
   std::jthread thread;
 };
 
@@ -91,6 +92,31 @@ TEST(Rpc, ASilentPeerIsDroppedAfterTheLimit) {
   Served served(milliseconds(150));
   Channel raw(std::move(served.peer));
   EXPECT_FALSE(raw.Receive());  // closed from the other side
+}
+
+TEST(Rpc, APeerThatDiesOrFallsSilentDuringItsCallIsLost) {
+  for (const bool dies : {false, true}) {
+    Served served(dies ? milliseconds(0) : milliseconds(50));
+    Channel peer(std::move(served.peer));
+    ASSERT_TRUE(peer.Send({{"id", 1}, {"call", "slow"}}));
+    if (dies) peer.Close();
+    served.thread.join();
+    EXPECT_EQ(served.lost, 1) << dies;
+  }
+}
+
+TEST(Rpc, APeerThatGoesWithoutACallOrAfterAStopIsNotLost) {
+  for (const bool calls : {false, true}) {
+    Served served;
+    Channel peer(std::move(served.peer));
+    if (calls) {
+      ASSERT_TRUE(peer.Send({{"id", 1}, {"call", "slow"}}));
+      ASSERT_TRUE(peer.Send({{"id", 2}, {"call", "stop"}}));
+    }
+    peer.Close();
+    served.thread.join();
+    EXPECT_EQ(served.lost, 0) << calls;
+  }
 }
 
 TEST(Rpc, GarbageEndsTheConnectionAndNothingElse) {
