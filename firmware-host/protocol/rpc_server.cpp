@@ -45,6 +45,17 @@ Json Answer(const Json& id, const Result<Json>& result) {
   return answer;
 }
 
+// A function that reads a parameter of the wrong type throws: the one place where that ends.
+Json AnswerOf(const Json& id, const RpcFunction& function, const Json& params,
+              std::stop_token stop) {
+  try {
+    return Answer(id, function.run(params, std::move(stop)));
+  } catch (const nlohmann::json::exception& e) {
+    return Answer(id, BadInput(std::string("a parameter has the wrong type: ") + e.what(), "params",
+                               "use a client of the same version"));
+  }
+}
+
 // Runs the calls that take time, one at a time; a second one while one runs is refused.
 class SlowLane {
  public:
@@ -122,9 +133,9 @@ Status Dispatch(const Json& request, const RpcFunctions& functions, Channel& cha
   const Json params = request.value("params", Json::object());
   const RpcFunction& function = found->second;
   if (function.cancels) slow.CancelJob();
-  if (function.immediate) return channel.Send(Answer(id, function.run(params, stop)));
+  if (function.immediate) return channel.Send(AnswerOf(id, function, params, stop));
   const bool taken = slow.Offer([&function, params, id](std::stop_token lane_stop) {
-    return Answer(id, function.run(params, lane_stop));
+    return AnswerOf(id, function, params, lane_stop);
   });
   if (taken) return {};
   return channel.Send(

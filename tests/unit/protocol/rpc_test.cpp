@@ -64,6 +64,16 @@ TEST(Rpc, ValuesAndErrorsComeBackToTheirCaller) {
   EXPECT_EQ(client.Call("none").error().kind, ErrorKind::bad_input);
 }
 
+TEST(Rpc, AParameterOfTheWrongTypeIsRefusedAndTheServerLivesOn) {
+  Served served;
+  RpcClient client(std::move(served.peer));
+  const auto refused = client.Call("twice", {{"x", "many"}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+  EXPECT_FALSE(client.Call("twice", 3)) << "not even an object";
+  EXPECT_EQ(client.Call("twice", {{"x", 2}}).value(), 4);
+}
+
 TEST(Rpc, AStopIsNeverQueuedBehindARunningCall) {
   Served served;
   RpcClient client(std::move(served.peer));
