@@ -87,7 +87,7 @@ Result<std::unique_ptr<Page>> Page::Start(int port, PageBackend backend) {
                          : (server.bind_to_port("127.0.0.1", port) ? port : -1);
   if (impl->port <= 0)
     return BadInput("the page's port is taken", "127.0.0.1:" + std::to_string(port),
-                    "free it or give another page_port in the station file");
+                    "free it or give scanstationd another --page-port");
   impl->thread = std::thread([raw = impl.get()] { raw->server.listen_after_bind(); });
   return std::unique_ptr<Page>(new Page(std::move(impl)));
 }
