@@ -67,12 +67,13 @@ Result<GpioPlace> FindGpioLines(std::span<const GpioChipInfo> chips, const GpioR
   const std::string wanted =
       request.chip.empty() ? "a chip with these lines" : "chip '" + request.chip + "'";
   if (candidates.empty()) {
-    return DeviceFault(fmt::format("there is no {} (chips here: {})", wanted, Labels(chips)),
-                       fmt::format("gpio {}", request.chip.empty() && !request.lines.empty()
-                                                  ? request.lines.front().name
-                                                  : request.chip),
-                       "give the label of a chip that 'scanstation device gpio list' shows, and check "
-                       "that this user may open /dev/gpiochip*");
+    return DeviceFault(
+        fmt::format("there is no {} (chips here: {})", wanted, Labels(chips)),
+        fmt::format("gpio {}", request.chip.empty() && !request.lines.empty()
+                                   ? request.lines.front().name
+                                   : request.chip),
+        "give the label of a chip that 'scanstation device gpio list' shows, and check "
+        "that this user may open /dev/gpiochip*");
   }
   if (candidates.size() > 1) {
     return DeviceFault(fmt::format("{} times {}", candidates.size(), wanted), "gpio",

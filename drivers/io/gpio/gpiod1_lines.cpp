@@ -1,12 +1,11 @@
 // libgpiod 1.6, as in Debian 12.
 #include <gpiod.h>
 
-#include <fmt/format.h>
-
 #include <cassert>
-#include <cstring>
+#include <cerrno>
 
 #include "drivers/io/gpio/chip_files.h"
+#include "drivers/io/gpio/gpiod_chip.h"
 #include "drivers/io/gpio/gpiod_lines.h"
 
 namespace scan {
@@ -118,9 +117,7 @@ class Gpiod1Lines final : public GpioLines {
   }
 
   tl::unexpected<Error> Fault(const char* what, std::size_t line) const {
-    return DeviceFault(fmt::format("{} the line: {}", what, std::strerror(errno)),
-                       fmt::format("gpio {}/{}", label_, request_.lines[line].name),
-                       "check that the board is still there, then start again");
+    return GpiodLineFault(what, label_, request_.lines[line].name);
   }
 
   GpioRequest request_;
@@ -132,26 +129,18 @@ class Gpiod1Lines final : public GpioLines {
 
 }  // namespace
 
-std::vector<GpioChipInfo> ListGpiodChips() {
-  std::vector<GpioChipInfo> chips;
-  for (const std::string& path : GpioChipPaths()) {
-    if (const ChipHandle chip{gpiod_chip_open(path.c_str())}) {
-      chips.push_back(Describe(chip.get(), path));
-    }
-  }
-  return chips;
+std::optional<GpioChipInfo> DescribeGpiodChip(const std::string& path) {
+  const ChipHandle chip{gpiod_chip_open(path.c_str())};
+  if (!chip) return std::nullopt;
+  return Describe(chip.get(), path);
 }
 
-Result<std::unique_ptr<GpioLines>> OpenGpiodLines(const GpioRequest& request) {
-  assert(!request.lines.empty());
-  const auto chips = ListGpiodChips();
-  SCAN_TRY(const GpioPlace place, FindGpioLines(chips, request));
-  const GpioChipInfo& info = chips[place.chip];
+tl::expected<std::unique_ptr<GpioLines>, int> TakeGpiodLines(const GpioChipInfo& info,
+                                                             const GpioRequest& request,
+                                                             std::span<const unsigned> offsets) {
   auto lines = std::make_unique<Gpiod1Lines>(request, info.label);
   ChipHandle chip{gpiod_chip_open(info.path.c_str())};
-  if (!chip || !lines->Take(std::move(chip), place.offsets)) {
-    return tl::unexpected(GpioRequestError(info, request, place.offsets, errno));
-  }
+  if (!chip || !lines->Take(std::move(chip), offsets)) return tl::unexpected(errno);
   return lines;
 }
 

@@ -1,12 +1,11 @@
 // libgpiod 2, as in Debian 13.
 #include <gpiod.h>
 
-#include <fmt/format.h>
-
-#include <cassert>
-#include <cstring>
+#include <algorithm>
+#include <cerrno>
 
 #include "drivers/io/gpio/chip_files.h"
+#include "drivers/io/gpio/gpiod_chip.h"
 #include "drivers/io/gpio/gpiod_lines.h"
 
 namespace scan {
@@ -128,9 +127,7 @@ class Gpiod2Lines final : public GpioLines {
 
  private:
   tl::unexpected<Error> Fault(const char* what, std::size_t line) const {
-    return DeviceFault(fmt::format("{} the line: {}", what, std::strerror(errno)),
-                       fmt::format("gpio {}/{}", label_, request_.lines[line].name),
-                       "check that the board is still there, then start again");
+    return GpiodLineFault(what, label_, request_.lines[line].name);
   }
 
   GpioRequest request_;
@@ -144,26 +141,19 @@ class Gpiod2Lines final : public GpioLines {
 
 }  // namespace
 
-std::vector<GpioChipInfo> ListGpiodChips() {
-  std::vector<GpioChipInfo> chips;
-  for (const std::string& path : GpioChipPaths()) {
-    if (const ChipHandle chip{gpiod_chip_open(path.c_str())}) {
-      chips.push_back(Describe(chip.get(), path));
-    }
-  }
-  return chips;
+std::optional<GpioChipInfo> DescribeGpiodChip(const std::string& path) {
+  const ChipHandle chip{gpiod_chip_open(path.c_str())};
+  if (!chip) return std::nullopt;
+  return Describe(chip.get(), path);
 }
 
-Result<std::unique_ptr<GpioLines>> OpenGpiodLines(const GpioRequest& request) {
-  assert(!request.lines.empty());
-  const auto chips = ListGpiodChips();
-  SCAN_TRY(const GpioPlace place, FindGpioLines(chips, request));
-  const GpioChipInfo& info = chips[place.chip];
-  auto lines = std::make_unique<Gpiod2Lines>(request, info.label, place.offsets);
+tl::expected<std::unique_ptr<GpioLines>, int> TakeGpiodLines(const GpioChipInfo& info,
+                                                             const GpioRequest& request,
+                                                             std::span<const unsigned> offsets) {
+  auto lines = std::make_unique<Gpiod2Lines>(request, info.label,
+                                             std::vector<unsigned>(offsets.begin(), offsets.end()));
   const ChipHandle chip{gpiod_chip_open(info.path.c_str())};
-  if (!chip || !lines->Take(chip.get())) {
-    return tl::unexpected(GpioRequestError(info, request, place.offsets, errno));
-  }
+  if (!chip || !lines->Take(chip.get())) return tl::unexpected(errno);
   return lines;
 }
 
