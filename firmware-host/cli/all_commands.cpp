@@ -12,8 +12,9 @@ void AddAllCommands(CommandSet& commands) {
   AddReplay(commands);
   AddVerify(commands);
   AddImport(commands);
-  AddCameraDevices(commands);
-  AddMotionDevices(commands);
+  CLI::App& device = commands.AddGroup(nullptr, "device", "Devices tried by hand");
+  AddCameraDevices(commands, device);
+  AddMotionDevices(commands, device);
   AddDoctor(commands);
 #ifdef SCAN_RECONSTRUCTION
   AddSurface(commands);

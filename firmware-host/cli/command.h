@@ -38,12 +38,9 @@ class CommandSet {
     return AddTo(app_, name, description, std::move(run));
   }
 
-  // A subcommand that only holds others; null: at the top. Found again when it is there already.
+  // A subcommand that only holds others; null: at the top.
   CLI::App& AddGroup(CLI::App* parent, const std::string& name, const std::string& description) {
-    CLI::App& above = parent ? *parent : app_;
-    const auto same = [&](const CLI::App* other) { return other->get_name() == name; };
-    if (const auto there = above.get_subcommands(same); !there.empty()) return *there.front();
-    CLI::App* group = above.add_subcommand(name, description);
+    CLI::App* group = (parent ? *parent : app_).add_subcommand(name, description);
     group->require_subcommand(1);
     return *group;
   }

@@ -13,13 +13,13 @@ void AddResume(CommandSet& commands);
 void AddStationControl(CommandSet& commands);  // status stop pause continue
 
 // motion_commands.cpp: device motion ..., device gpio ...
-void AddMotionDevices(CommandSet& commands);
+void AddMotionDevices(CommandSet& commands, CLI::App& device);
 
 // doctor_command.cpp
 void AddDoctor(CommandSet& commands);
 
 // device_commands.cpp: device camera list|grab|controls|set
-void AddCameraDevices(CommandSet& commands);
+void AddCameraDevices(CommandSet& commands, CLI::App& device);
 
 // session_commands.cpp
 void AddReplay(CommandSet& commands);

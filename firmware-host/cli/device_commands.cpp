@@ -214,8 +214,11 @@ std::shared_ptr<CameraOptions> AddSelector(CLI::App& command,
   return options;
 }
 
-void AddCamera(CommandSet& commands, CLI::App& device) {
-  CLI::App& camera = commands.AddGroup(&device, "camera", "Cameras of the kernel (V4L2)");
+}  // namespace
+
+void AddCameraDevices(CommandSet& commands, CLI::App& device) {
+  CLI::App& camera = commands.AddGroup(&device, "camera",
+                                       "Cameras of the kernel (V4L2); no daemon may be using them");
   commands.AddTo(camera, "list", "Every camera with its port, formats and sizes",
                  [](const CliContext&) { return ListCameras(); });
   {
@@ -250,14 +253,6 @@ void AddCamera(CommandSet& commands, CLI::App& device) {
   grab.add_option("--set", options->controls, "NAME=VALUE of a control, more than once if needed");
   grab.add_option("--count", options->count, "so many stills")->check(CLI::Range(1, 10'000));
   grab.add_flag("--force", options->force, "overwrite files");
-}
-
-}  // namespace
-
-void AddCameraDevices(CommandSet& commands) {
-  CLI::App& device =
-      commands.AddGroup(nullptr, "device", "Devices tried by hand; no daemon may be using them");
-  AddCamera(commands, device);
 }
 
 }  // namespace scan

@@ -195,9 +195,7 @@ void AddGpio(CommandSet& commands, CLI::App& device) {
 
 }  // namespace
 
-void AddMotionDevices(CommandSet& commands) {
-  CLI::App& device =
-      commands.AddGroup(nullptr, "device", "Devices tried by hand; no daemon may be using them");
+void AddMotionDevices(CommandSet& commands, CLI::App& device) {
   AddMotion(commands, device);
   AddGpio(commands, device);
 }
