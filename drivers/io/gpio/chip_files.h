@@ -12,12 +12,16 @@
 
 namespace scan {
 
-inline std::vector<std::string> GpioChipPaths() {
+// Sorted by name. A link is another name of a chip that is listed by its own: the Raspberry Pi 5
+// has gpiochip4 -> gpiochip0.
+inline std::vector<std::string> GpioChipPaths(const std::filesystem::path& folder = "/dev") {
   std::vector<std::string> paths;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator("/dev", error)) {
-    if (entry.path().filename().string().rfind("gpiochip", 0) == 0) {
-      paths.push_back(entry.path().string());
+  std::filesystem::directory_iterator entry(folder, error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    std::error_code gone;
+    if (entry->path().filename().string().starts_with("gpiochip") && !entry->is_symlink(gone)) {
+      paths.push_back(entry->path().string());
     }
   }
   std::sort(paths.begin(), paths.end());

@@ -31,6 +31,12 @@ std::string Labels(std::span<const GpioChipInfo> chips) {
   return labels.empty() ? "none" : fmt::format("{}", fmt::join(labels, ", "));
 }
 
+std::string Names(const GpioRequest& request) {
+  std::vector<std::string_view> names;
+  for (const GpioLineConfig& line : request.lines) names.push_back(line.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 Result<std::vector<unsigned>> OffsetsOn(const GpioChipInfo& chip, const GpioRequest& request) {
   std::vector<unsigned> offsets;
   for (const GpioLineConfig& line : request.lines) {
@@ -65,18 +71,20 @@ Result<GpioPlace> FindGpioLines(std::span<const GpioChipInfo> chips, const GpioR
     if (request.chip.empty() ? has_names : chips[k].label == request.chip) candidates.push_back(k);
   }
   const std::string wanted =
-      request.chip.empty() ? "a chip with these lines" : "chip '" + request.chip + "'";
+      request.chip.empty() ? "chip with all of these lines" : "chip '" + request.chip + "'";
   if (candidates.empty()) {
     return DeviceFault(
-        fmt::format("there is no {} (chips here: {})", wanted, Labels(chips)),
+        fmt::format("there is no {} ({}; chips here: {})", wanted, Names(request), Labels(chips)),
         fmt::format("gpio {}", request.chip.empty() && !request.lines.empty()
                                    ? request.lines.front().name
                                    : request.chip),
-        "give the label of a chip that 'scanstation device gpio list' shows, and check "
-        "that this user may open /dev/gpiochip*");
+        "give the label of a chip and names of its lines as 'scanstation device gpio list' shows "
+        "them, "
+        "and check that this user may open /dev/gpiochip*");
   }
   if (candidates.size() > 1) {
-    return DeviceFault(fmt::format("{} times {}", candidates.size(), wanted), "gpio",
+    return DeviceFault(fmt::format("there is more than one {} ({})", wanted, Names(request)),
+                       "gpio",
                        request.chip.empty() ? "give the chip's label" : "detach one of them");
   }
   SCAN_TRY(auto offsets, OffsetsOn(chips[candidates[0]], request));
