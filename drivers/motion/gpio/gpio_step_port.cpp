@@ -56,6 +56,7 @@ Status GpioStepPort::Enable(bool on) {
     }
   }
   if (on == enabled_) return {};
+  enabled_.reset();
   SCAN_CHECK(SetControl(enable_line_, on));
   enabled_ = on;
   const std::int64_t ready_ns = clock_->Now().mono_ns + NsFromUs(wiring_.enable_ms * 1e3);
@@ -65,6 +66,7 @@ Status GpioStepPort::Enable(bool on) {
 
 Status GpioStepPort::Brake(bool on) {
   if (on == braked_) return {};
+  braked_.reset();
   SCAN_CHECK(SetControl(brake_line_, on));
   braked_ = on;
   return {};
@@ -73,6 +75,7 @@ Status GpioStepPort::Brake(bool on) {
 Status GpioStepPort::SetDirection(bool positive) {
   if (positive_ == positive) return {};
   clock_->SleepUntil(hold_ns_);
+  positive_.reset();
   const GpioLevel level{0, positive};
   SCAN_CHECK(control_->Set({&level, 1}));
   positive_ = positive;

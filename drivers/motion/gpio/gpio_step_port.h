@@ -51,8 +51,8 @@ class GpioStepPort final : public StepPort {
   std::unique_ptr<GpioLines> control_;  // direction, enable, brake
   std::optional<std::size_t> enable_line_, brake_line_;
   std::optional<bool> positive_;
-  bool enabled_ = false;
-  bool braked_ = true;
+  std::optional<bool> enabled_ = false;  // nothing: a call failed, the line may have either level
+  std::optional<bool> braked_ = true;
   std::int64_t settled_ns_ = 0;  // no step before: direction, current, low time of the last pulse
   std::int64_t hold_ns_ = 0;     // no change of direction before
 };

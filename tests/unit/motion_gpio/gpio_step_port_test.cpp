@@ -102,6 +102,22 @@ TEST(GpioStepPort, EveryFailingLineCallIsReported) {
   }
 }
 
+TEST(GpioStepPort, AfterAFailedCallTheSafeLevelIsWrittenAnyway) {
+  Bench bench;
+  bench.board->FailAt(1);
+  EXPECT_FALSE(bench.port->Enable(true));  // who knows whether the line heard it
+  EXPECT_FALSE(bench.port->Brake(false));
+  bench.board->FailAt(0);
+  bench.events.clear();
+  EXPECT_TRUE(bench.port->Brake(true));
+  EXPECT_TRUE(bench.port->Enable(false));
+  ASSERT_EQ(bench.events.size(), 2U);
+  EXPECT_EQ(bench.events[0].line, kBrake);
+  EXPECT_TRUE(bench.events[0].high);
+  EXPECT_EQ(bench.events[1].line, kEn);
+  EXPECT_TRUE(bench.events[1].high) << "active is low";
+}
+
 TEST(GpioStepPort, ABrakeFallsInWhenThePortGoes) {
   Bench bench;
   ASSERT_TRUE(bench.port->Enable(true));
