@@ -32,7 +32,7 @@ struct V4l2Counters {
   std::int64_t restarts = 0;    // of the stream
 };
 
-// The stream runs from the first Configure or Grab on; frames that nobody asked for are dropped.
+// The stream runs from Open on; frames that nobody asked for are dropped.
 // A frame counts when its exposure began after the call: its stamp (arrival of its first bytes),
 // less the exposure time and `latency_frames` frame intervals, is not before the call. UVC carries
 // no exposure stamp, so this bound is what Frame::exposure states.
