@@ -14,12 +14,12 @@ namespace fs = std::filesystem;
 Result<StagedFolder> StagedFolder::Create(const fs::path& target, bool force) {
   fs::path clean = fs::absolute(target).lexically_normal();
   if (!clean.has_filename()) clean = clean.parent_path();
-  const bool existed = fs::exists(clean);
+  std::error_code code;
+  const bool existed = fs::exists(clean, code);
   SCAN_CHECK(PrepareOutputFolder(clean, force));
-  if (!existed) fs::remove(clean);  // it was only made to see that it can be
+  if (!existed) fs::remove(clean, code);  // it was only made to see that it can be
   fs::path staging = clean.parent_path() /
                      ("." + clean.filename().string() + ".part-" + std::to_string(::getpid()));
-  std::error_code code;
   fs::remove_all(staging, code);
   fs::create_directories(staging, code);
   if (code)
@@ -41,9 +41,13 @@ StagedFolder::~StagedFolder() {
 Status StagedFolder::Commit() {
   std::error_code code;
   const fs::path old = staging_.string() + ".old";
-  const bool replace = fs::exists(target_);
+  const bool replace = fs::exists(target_, code);
   if (replace) fs::rename(target_, old, code);
-  if (!code) fs::rename(staging_, target_, code);
+  if (!code || !replace) fs::rename(staging_, target_, code);
+  if (code && replace) {  // what was there stays there
+    std::error_code ignored;
+    if (!fs::exists(target_, ignored)) fs::rename(old, target_, ignored);
+  }
   if (code)
     return Failed("cannot put the output in its place (" + code.message() + ")", target_.string(),
                   "check the folder's rights");

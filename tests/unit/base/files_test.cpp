@@ -27,6 +27,18 @@ TEST(Files, AnUnwritablePlaceIsAnErrorAndLeavesNothing) {
   EXPECT_FALSE(WriteFileDurably("/proc/none/x", std::string_view("x")));
 }
 
+TEST(Files, AStagedFolderThatCannotTakeItsPlaceLeavesWhatWasThere) {
+  TempFolder folder;
+  const auto out = folder.path() / "out";
+  ASSERT_TRUE(PrepareOutputFolder(out, false));
+  ASSERT_TRUE(WriteFileDurably(out / "x", std::string_view("old")));
+  auto staged = StagedFolder::Create(out, true);
+  ASSERT_TRUE(staged);
+  std::filesystem::remove(staged->path());  // now there is nothing to put there
+  EXPECT_FALSE(staged->Commit());
+  EXPECT_EQ(ReadTextFile(out / "x").value_or("lost"), "old");
+}
+
 TEST(Files, OutputFolderIsNotOverwrittenWithoutForce) {
   TempFolder folder;
   const auto out = folder.path() / "out";
