@@ -207,11 +207,9 @@ Result<CommandOutput> GrabStills(const CameraOptions& options, const CliContext&
   return output;
 }
 
-std::shared_ptr<CameraOptions> AddSelector(CLI::App& command,
-                                           std::shared_ptr<CameraOptions> options) {
+void AddSelector(CLI::App& command, const std::shared_ptr<CameraOptions>& options) {
   command.add_option("--port", options->selector.port, "where it is plugged in, as listed");
   command.add_option("--name", options->selector.name, "its name, as listed");
-  return options;
 }
 
 }  // namespace
@@ -244,15 +242,19 @@ void AddCameraDevices(CommandSet& commands, CLI::App& device) {
   AddSelector(grab, options);
   grab.add_option("--out", options->out, "picture file; jpg or png is the camera's choice")
       ->required();
-  grab.add_option("--config", options->config, "station file that says which camera and how");
+  CLI::Option* config =
+      grab.add_option("--config", options->config, "station file that says which camera and how");
   grab.add_option("--camera", options->camera, "id of the camera in that file")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(config);
   grab.add_option("--format", options->format, "MJPG YUYV NV12 ...; default the best of the size");
   grab.add_option("--size", options->size, "WIDTHxHEIGHT; default the largest");
   grab.add_option("--exposure-us", options->exposure_us, "exposure time; default as it is");
   grab.add_option("--set", options->controls, "NAME=VALUE of a control, more than once if needed");
   grab.add_option("--count", options->count, "so many stills")->check(CLI::Range(1, 10'000));
   grab.add_flag("--force", options->force, "overwrite files");
+  for (const char* said_by_the_file : {"--port", "--name", "--format", "--size", "--set"})
+    config->excludes(grab.get_option(said_by_the_file));
 }
 
 }  // namespace scan

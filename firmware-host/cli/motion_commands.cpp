@@ -59,10 +59,11 @@ Result<CommandOutput> WatchMotion(const MotionOptions& options, const CliContext
   do {
     const MotionStatus status = motion->ReadStatus();
     const std::string text =
-        fmt::format("turntable {} {:.3f} deg, lift {} {:.3f} mm, alarm {}{}{}",
+        fmt::format("turntable {} {:.3f} deg, lift {} {:.3f} mm, alarm {}{}{}{}{}",
                     AxisStateName(status.turntable), status.position.turntable_deg.counted,
                     AxisStateName(status.lift), status.position.lift_mm.counted,
-                    NameOf(status.alarm), status.interlocks.empty() ? "" : ": ", status.interlocks);
+                    NameOf(status.alarm), status.interlocks.empty() ? "" : ": ", status.interlocks,
+                    status.fault.empty() ? "" : ", fault: ", status.fault);
     if (text != before) {
       fmt::print("{}\n", context.json ? ToJson(status).dump() : text);
       std::fflush(stdout);
