@@ -43,49 +43,46 @@ struct JpegDecoder {
   JpegError error;
 };
 
-void Begin(JpegDecoder& decoder) {
+// Reads the header, then does `work`; false when libjpeg found an error on the way.
+// Precondition: nothing in `work` has a destructor.
+template <class Work>
+bool Decode(JpegDecoder& decoder, std::span<const std::byte> bytes, const Work& work) {
   decoder.info.err = jpeg_std_error(&decoder.error.manager);
   decoder.error.manager.error_exit = OnError;
   decoder.error.manager.emit_message = OnMessage;
   decoder.error.text[0] = 0;
-}
-
-bool ReadHead(JpegDecoder& decoder, const unsigned char* bytes, std::size_t size, JpegHead* head) {
-  Begin(decoder);
   if (setjmp(decoder.error.jump) != 0) {
     jpeg_destroy_decompress(&decoder.info);
     return false;
   }
   jpeg_create_decompress(&decoder.info);
-  jpeg_mem_src(&decoder.info, bytes, size);
+  jpeg_mem_src(&decoder.info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   jpeg_read_header(&decoder.info, TRUE);
-  head->w = static_cast<int>(decoder.info.image_width);
-  head->h = static_cast<int>(decoder.info.image_height);
-  head->has_huffman_tables = decoder.info.dc_huff_tbl_ptrs[0] != nullptr;
+  work(decoder.info);
   jpeg_destroy_decompress(&decoder.info);
   return true;
 }
 
-bool ReadPixels(JpegDecoder& decoder, const unsigned char* bytes, std::size_t size,
-                unsigned char* bgr, std::size_t stride, std::size_t* used) {
-  Begin(decoder);
-  if (setjmp(decoder.error.jump) != 0) {
-    jpeg_destroy_decompress(&decoder.info);
-    return false;
-  }
-  jpeg_create_decompress(&decoder.info);
-  jpeg_mem_src(&decoder.info, bytes, size);
-  jpeg_read_header(&decoder.info, TRUE);
-  decoder.info.out_color_space = JCS_EXT_BGR;
-  jpeg_start_decompress(&decoder.info);
-  while (decoder.info.output_scanline < decoder.info.output_height) {
-    JSAMPROW row = bgr + stride * decoder.info.output_scanline;
-    jpeg_read_scanlines(&decoder.info, &row, 1);
-  }
-  jpeg_finish_decompress(&decoder.info);
-  *used = size - decoder.info.src->bytes_in_buffer;
-  jpeg_destroy_decompress(&decoder.info);
-  return true;
+bool ReadHead(JpegDecoder& decoder, std::span<const std::byte> bytes, JpegHead* head) {
+  return Decode(decoder, bytes, [head](const jpeg_decompress_struct& info) {
+    head->w = static_cast<int>(info.image_width);
+    head->h = static_cast<int>(info.image_height);
+    head->has_huffman_tables = info.dc_huff_tbl_ptrs[0] != nullptr;
+  });
+}
+
+bool ReadPixels(JpegDecoder& decoder, std::span<const std::byte> bytes, unsigned char* bgr,
+                std::size_t stride, std::size_t* used) {
+  return Decode(decoder, bytes, [=](jpeg_decompress_struct& info) {
+    info.out_color_space = JCS_EXT_BGR;
+    jpeg_start_decompress(&info);
+    while (info.output_scanline < info.output_height) {
+      JSAMPROW row = bgr + stride * info.output_scanline;
+      jpeg_read_scanlines(&info, &row, 1);
+    }
+    jpeg_finish_decompress(&info);
+    *used = bytes.size() - info.src->bytes_in_buffer;
+  });
 }
 
 tl::unexpected<Error> Corrupt(const std::string& what) {
@@ -93,15 +90,11 @@ tl::unexpected<Error> Corrupt(const std::string& what) {
                      "check cable, hub and power supply; a lower frame rate may help");
 }
 
-const unsigned char* Uchar(std::span<const std::byte> bytes) {
-  return reinterpret_cast<const unsigned char*>(bytes.data());
-}
-
 Result<JpegHead> HeadOf(std::span<const std::byte> bytes) {
   JpegDecoder decoder{};
   JpegHead head;
   if (bytes.size() < 4) return Corrupt("it is empty");
-  if (!ReadHead(decoder, Uchar(bytes), bytes.size(), &head)) return Corrupt(decoder.error.text);
+  if (!ReadHead(decoder, bytes, &head)) return Corrupt(decoder.error.text);
   if (head.w < 1 || head.h < 1 || head.w > 32768 || head.h > 32768)
     return Corrupt("its size is absurd");
   return head;
@@ -132,7 +125,7 @@ Result<cv::Mat> DecodeJpegStrictly(std::span<const std::byte> bytes, std::size_t
   cv::Mat picture(head.h, head.w, CV_8UC3);
   JpegDecoder decoder{};
   std::size_t length = 0;
-  if (!ReadPixels(decoder, Uchar(bytes), bytes.size(), picture.data, picture.step, &length))
+  if (!ReadPixels(decoder, bytes, picture.data, picture.step, &length))
     return Corrupt(decoder.error.text);
   if (used) *used = length;
   return picture;
