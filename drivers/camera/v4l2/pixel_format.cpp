@@ -53,6 +53,9 @@ constexpr PixelFormat kFormats[] = {
     {V4L2_PIX_FMT_GREY, "GREY", L::grey, 8, O::none},
 };
 
+// Pixels that share bytes are stored together, also where the width ends among them.
+int WholeGroups(int w, int group) { return (w + group - 1) / group * group; }
+
 std::int64_t NsOf(const v4l2_fract& seconds) {
   if (seconds.denominator == 0) return 0;
   return std::int64_t{seconds.numerator} * 1'000'000'000 / seconds.denominator;
@@ -159,9 +162,9 @@ int MinBytesPerLine(const PixelFormat& format, int w) {
     case PixelLayout::mjpeg:
       return 0;
     case PixelLayout::yuyv:
-      return 2 * w;
+      return 2 * WholeGroups(w, 2);
     case PixelLayout::nv12:
-      return w;
+      return WholeGroups(w, 2);
     case PixelLayout::rgb:
     case PixelLayout::bgr:
       return 3 * w;
@@ -169,7 +172,7 @@ int MinBytesPerLine(const PixelFormat& format, int w) {
     case PixelLayout::bayer:
       return format.bits > 8 ? 2 * w : w;
     case PixelLayout::bayer_packed:
-      return (w * format.bits + 7) / 8;
+      return WholeGroups(w, format.bits == 10 ? 4 : 2) * format.bits / 8;
   }
   return 0;
 }

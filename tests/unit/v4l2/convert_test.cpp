@@ -89,6 +89,24 @@ TEST(Convert, YuyvAndNv12GiveTheColoursOfEveryMatrixAndRange) {
   }
 }
 
+TEST(Convert, AnOddWidthEndsWithinAGroupOfPixels) {
+  for (const char* name : {"YUYV", "NV12"}) {
+    StreamFormat format = FormatNamed(name, 5, 2);
+    format.full_range = true;
+    std::vector<std::uint8_t> bytes(format.size_image, 100);  // Y
+    const bool yuyv = format.format->layout == PixelLayout::yuyv;
+    const std::size_t from = yuyv ? 0 : 2 * static_cast<std::size_t>(format.bytes_per_line);
+    for (std::size_t cb = from + (yuyv ? 1 : 0), step = yuyv ? 4 : 2; cb < bytes.size(); cb += step)
+      bytes[cb] = 160;
+    for (std::size_t cr = from + (yuyv ? 3 : 1), step = yuyv ? 4 : 2; cr < bytes.size(); cr += step)
+      bytes[cr] = 90;
+    const auto picture = PictureOf(format, Bytes(bytes));
+    ASSERT_TRUE(picture) << ToString(picture.error());
+    // BT.601: B = Y + 1.772 (Cb - 128), R = Y + 1.402 (Cr - 128).
+    ExpectColour(*picture, {157, 116, 47});
+  }
+}
+
 TEST(Convert, LimitedBt601AgreesWithOpenCvOnLuma) {
   StreamFormat format = FormatNamed("YUYV", 256, 1);
   std::vector<std::uint8_t> bytes(512, 128);

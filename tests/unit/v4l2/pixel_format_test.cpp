@@ -65,6 +65,11 @@ TEST(PixelFormat, BytesOfAPictureFollowTheLayout) {
   EXPECT_EQ(bytes("pRAA", 8, 2, 0), 20U);
   EXPECT_EQ(bytes("pRCC", 8, 2, 0), 24U);
   EXPECT_EQ(bytes("MJPG", 640, 480, 0), 0U);
+  // Widths that end within a group of pixels.
+  EXPECT_EQ(bytes("YUYV", 5, 2, 0), 24U);
+  EXPECT_EQ(bytes("NV12", 5, 2, 0), 18U);
+  EXPECT_EQ(bytes("pRAA", 5, 2, 0), 20U);
+  EXPECT_EQ(bytes("pRCC", 5, 2, 0), 18U);
 }
 
 TEST(PixelFormat, NamesAreTheFourLettersOfTheKernel) {
