@@ -1,4 +1,4 @@
-// The pieces that session.json and log.jsonl share.
+// The pieces that session.json shares with log.jsonl and other files.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,6 +10,8 @@ namespace scan {
 
 nlohmann::ordered_json ToJson(const PlannedView& view);
 Result<PlannedView> PlannedViewFrom(const JsonObject& object);
+
+nlohmann::ordered_json ToJson(const Intrinsics& intrinsics);
 
 nlohmann::ordered_json ToJson(const PriorSigma& sigma);
 Result<PriorSigma> PriorSigmaFrom(const JsonObject& object);

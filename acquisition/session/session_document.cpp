@@ -43,25 +43,14 @@ Json ToJson(const AxisDocument& axis) {
 }
 
 Json ToJson(const CameraDocument& camera) {
-  const Intrinsics& in = camera.intrinsics;
   Json poses = Json::object();
   for (const auto& [aim, pose] : camera.camera_from_lift)
     poses[aim] = pose ? JsonRows(pose->isometry()) : Json(nullptr);
-  Json json = {{"id", camera.id},
-               {"w", in.w},
-               {"h", in.h},
-               {"fl_x", in.fl_x},
-               {"fl_y", in.fl_y},
-               {"cx", in.cx},
-               {"cy", in.cy},
-               {"k1", in.k1},
-               {"k2", in.k2},
-               {"p1", in.p1},
-               {"p2", in.p2},
-               {"k3", in.k3},
-               {"sigma", {{"fl_rel", camera.sigma.fl_rel}, {"c_px", camera.sigma.c_px}}},
+  Json json = {{"id", camera.id}};
+  json.update(ToJson(camera.intrinsics));
+  json.update({{"sigma", {{"fl_rel", camera.sigma.fl_rel}, {"c_px", camera.sigma.c_px}}},
                {"camera_from_lift", std::move(poses)},
-               {"camera_from_lift_sigma", ToJson(camera.camera_from_lift_sigma)}};
+               {"camera_from_lift_sigma", ToJson(camera.camera_from_lift_sigma)}});
   if (!camera.camera_from_lift_sigma_by_aim.empty()) {
     Json& by_aim = json["camera_from_lift_sigma_by_aim"] = Json::object();
     for (const auto& [aim, sigma] : camera.camera_from_lift_sigma_by_aim)
@@ -240,6 +229,12 @@ Status ValidateCamera(const CameraDocument& camera, const std::string& where) {
 }
 
 }  // namespace
+
+Json ToJson(const Intrinsics& in) {
+  return {{"w", in.w},   {"h", in.h},   {"fl_x", in.fl_x}, {"fl_y", in.fl_y},
+          {"cx", in.cx}, {"cy", in.cy}, {"k1", in.k1},     {"k2", in.k2},
+          {"p1", in.p1}, {"p2", in.p2}, {"k3", in.k3}};
+}
 
 Json ToJson(const PriorSigma& sigma) {
   return {{"rotation_deg", sigma.rotation_deg}, {"translation_mm", sigma.translation_mm}};

@@ -3,6 +3,7 @@
 #include <array>
 #include <fstream>
 
+#include "acquisition/session/document_json.h"
 #include "drivers/base/virtual_clock.h"
 #include "drivers/station/geometry.h"
 #include "firmware-host/protocol/motion_client.h"
@@ -41,22 +42,10 @@ Json RowsOf(const CameraFromModel& camera_from_model) {
 }
 
 Json TruthLine(const FrameTruth& frame) {
-  const Intrinsics& in = frame.state.intrinsics;
   return {{"camera", frame.camera_id},
           {"sensor_sequence", frame.sensor_sequence},
           {"camera_from_model", RowsOf(frame.state.camera_from_model)},
-          {"intrinsics",
-           {{"w", in.w},
-            {"h", in.h},
-            {"fl_x", in.fl_x},
-            {"fl_y", in.fl_y},
-            {"cx", in.cx},
-            {"cy", in.cy},
-            {"k1", in.k1},
-            {"k2", in.k2},
-            {"p1", in.p1},
-            {"p2", in.p2},
-            {"k3", in.k3}}}};
+          {"intrinsics", Json(ToJson(frame.state.intrinsics))}};
 }
 
 Result<TruthSink> MakeTruthSink(const std::filesystem::path& path) {
