@@ -102,7 +102,8 @@ int main(int argc, char** argv) {
     return 0;
   }
   std::vector<double> bare, ratios;
-  for (int k = 0; k < std::atoi(argv[4]); ++k) {
+  const int pairs = std::max(1, std::atoi(argv[4]));
+  for (int k = 0; k < pairs; ++k) {
     bare.push_back(BareRate(path, line, count));
     ratios.push_back(DriverRate(argv[1], line, count) / bare.back());
   }
