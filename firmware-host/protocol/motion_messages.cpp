@@ -114,10 +114,9 @@ Result<MoveReport> MoveReportFromJson(const Json& json) {
 }
 Result<MotionStatus> MotionStatusFromJson(const Json& json) {
   return Guarded<MotionStatus>("status", json, [](const Json& j) {
-    return MotionStatus{StateFrom(j.at("turntable")), StateFrom(j.at("lift")),
-                        j.at("reference_epoch").get<int>(), PositionFrom(j.at("position")),
-                        j.at("fault").get<std::string>(),
-                        AlarmFrom(j.at("alarm")),
+    return MotionStatus{StateFrom(j.at("turntable")),         StateFrom(j.at("lift")),
+                        j.at("reference_epoch").get<int>(),   PositionFrom(j.at("position")),
+                        j.at("fault").get<std::string>(),     AlarmFrom(j.at("alarm")),
                         j.at("interlocks").get<std::string>()};
   });
 }
