@@ -22,13 +22,9 @@ std::optional<Number> NumberFrom(const NoteEntry& note, const char* key) {
   return number;
 }
 
-bool Has(const NoteEntry& note, const char* key, const char* value) {
+bool Has(const NoteEntry& note, const char* key, std::string_view value) {
   const auto found = note.values.find(key);
   return found != note.values.end() && found->second == value;
-}
-
-const char* WordOf(SpecimenAction action) {
-  return action == SpecimenAction::remove ? words::kRemove : words::kPlace;
 }
 
 }  // namespace
@@ -76,14 +72,14 @@ NoteEntry NoteOf(SpecimenAction action, const PromptAnswer& answer) {
   note.text = fmt::format("specimen {}{}", answer.confirmed ? "" : "not ",
                           remove ? "removed for background plates" : "put back");
   if (!answer.note.empty()) note.text += ": " + answer.note;
-  note.values = {{words::kPromptKey, WordOf(action)},
+  note.values = {{words::kPromptKey, std::string(NameOf(action))},
                  {words::kConfirmedKey, answer.confirmed ? "yes" : "no"},
                  {words::kNoteKey, answer.note}};
   return note;
 }
 
 std::optional<PromptAnswer> AnswerFrom(const NoteEntry& note, SpecimenAction action) {
-  if (!Has(note, words::kPromptKey, WordOf(action))) return std::nullopt;
+  if (!Has(note, words::kPromptKey, NameOf(action))) return std::nullopt;
   PromptAnswer answer;
   answer.confirmed = Has(note, words::kConfirmedKey, "yes");
   if (const auto text = note.values.find(words::kNoteKey); text != note.values.end())

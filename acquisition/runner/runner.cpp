@@ -128,6 +128,10 @@ std::string_view NameOf(CaptureState state) {
   return "starting";
 }
 
+std::string_view NameOf(SpecimenAction action) {
+  return action == SpecimenAction::remove ? run_words::kRemove : run_words::kPlace;
+}
+
 std::string_view NameOf(CaptureOutcome outcome) {
   switch (outcome) {
     case CaptureOutcome::complete:

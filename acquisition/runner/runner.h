@@ -7,6 +7,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "acquisition/plan/framing.h"
@@ -19,6 +20,8 @@
 namespace scan {
 
 enum class SpecimenAction { remove, place };
+
+std::string_view NameOf(SpecimenAction action);  // "remove" "place", as in the log
 
 struct PromptAnswer {
   bool confirmed = true;  // false: the plates are skipped (remove), or the run ends (place)

@@ -10,7 +10,7 @@ void AddAllCommands(CommandSet& commands);
 // station_commands.cpp: clients of scanstationd
 void AddCapture(CommandSet& commands);
 void AddResume(CommandSet& commands);
-void AddStationControl(CommandSet& commands);  // status stop pause continue
+void AddStationControl(CommandSet& commands);  // confirm status stop pause continue
 
 // motion_commands.cpp: device motion ..., device gpio ...
 void AddMotionDevices(CommandSet& commands, CLI::App& device);

@@ -2,6 +2,7 @@
 
 #include <thread>
 
+#include "firmware-host/cli/operator_dialogue.h"
 #include "firmware-host/protocol/rpc.h"
 #include "firmware-host/protocol/socket.h"
 
@@ -36,11 +37,13 @@ Result<Json> CaptureAndFollow(RpcClient& daemon, const Json& params, const Progr
   SCAN_CHECK(daemon.Call("capture", params, kPatience));
   const std::stop_callback on_stop(
       stop, [&daemon] { (void)daemon.Call("stop", Json::object(), kPatience); });
+  OperatorDialogue dialogue;
   while (true) {
     SCAN_TRY(const Json status, daemon.Call("status", Json::object(), kPatience));
     const double count = status.value("view_count", 0);
     const double done = status.value("views_accepted", 0.0) + status.value("views_failed", 0.0);
     Report(progress, "capture", count > 0 ? done / count : 0);
+    dialogue.Follow(daemon, status.value("question", ""));
     if (status.value("state", "") == "idle") return Outcome(status, params.value("out", ""));
     std::this_thread::sleep_for(kPollInterval);
   }

@@ -15,9 +15,9 @@ Result<std::unique_ptr<RpcClient>> ConnectDaemon(
     const std::filesystem::path& socket,
     std::chrono::milliseconds patience = std::chrono::milliseconds(0));
 
-// Starts a capture and follows it to its end; a requested stop token stops the station.
-// Returns the daemon's last status. Errors: bad_input for a refused request, cancelled, device or
-// failed when the capture did not complete.
+// Starts a capture and follows it to its end; the station's questions are put to the terminal. A
+// requested stop token stops the station. Returns the daemon's last status. Errors: bad_input for a
+// refused request, cancelled, device or failed when the capture did not complete.
 Result<Json> CaptureAndFollow(RpcClient& daemon, const Json& params, const ProgressFn& progress,
                               std::stop_token stop);
 

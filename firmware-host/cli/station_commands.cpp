@@ -1,4 +1,4 @@
-// Clients of scanstationd: capture, resume, status, stop, pause, continue.
+// Clients of scanstationd: capture, resume, confirm, status, stop, pause, continue.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -14,14 +14,18 @@ namespace {
 struct StationOptions {
   std::filesystem::path socket = DefaultSocket();
   std::filesystem::path session;
+  bool no_plates = false;  // of capture and resume
+  bool no = false;         // of confirm
 };
 
 Result<CommandOutput> RunCaptureCommand(const StationOptions& options, bool resume,
                                         const CliContext& context) {
   SCAN_TRY(const auto daemon, ConnectDaemon(options.socket));
   const std::string session = std::filesystem::absolute(options.session).string();
-  SCAN_TRY(const Json status, CaptureAndFollow(*daemon, {{"out", session}, {"resume", resume}},
-                                               context.progress, context.stop));
+  SCAN_TRY(const Json status,
+           CaptureAndFollow(*daemon,
+                            {{"out", session}, {"resume", resume}, {"plates", !options.no_plates}},
+                            context.progress, context.stop));
   return CommandOutput{status,
                        fmt::format("{} of {} views in {}\n", status.value("views_accepted", 0),
                                    status.value("view_count", 0), session)};
@@ -33,17 +37,37 @@ Result<CommandOutput> CallSimple(const StationOptions& options, const std::strin
   return CommandOutput{answer, call == "status" ? "" : "done\n"};
 }
 
+Result<CommandOutput> ConfirmCommand(const StationOptions& options) {
+  SCAN_TRY(const auto daemon, ConnectDaemon(options.socket));
+  SCAN_TRY(const Json answer,
+           daemon->Call("answer", {{"confirmed", !options.no}, {"note", "confirm"}},
+                        std::chrono::milliseconds(10000)));
+  return CommandOutput{answer, "done\n"};
+}
+
+void AddPlatesOption(CLI::App& command, StationOptions& options) {
+  command.add_flag("--no-plates", options.no_plates,
+                   "no background pictures: nobody is asked to take the specimen away");
+}
+
+std::string Question(const std::string& question) {
+  if (question == "remove") return "take the specimen off the platter, then: scanstation confirm";
+  if (question == "place") return "put the specimen back on the platter, then: scanstation confirm";
+  return "nothing";
+}
+
 Result<CommandOutput> ReadStatusCommand(const StationOptions& options) {
   SCAN_TRY(CommandOutput output, CallSimple(options, "status"));
   const Json& s = output.json;
   const Json& motion = s["motion"];
   output.text = fmt::format(
       "state      {}\nviews      {} of {}, {} failed\nsession    {}\nturntable  {} {:.3f} deg\n"
-      "lift       {} {:.3f} mm\nmessage    {}\n",
+      "lift       {} {:.3f} mm\nasks       {}\nmessage    {}\n",
       s.value("state", ""), s.value("views_accepted", 0), s.value("view_count", 0),
       s.value("views_failed", 0), s.value("session", ""), motion.value("turntable", ""),
       motion["position"]["turntable_deg"].value("estimated", 0.0), motion.value("lift", ""),
-      motion["position"]["lift_mm"].value("estimated", 0.0), s.value("message", ""));
+      motion["position"]["lift_mm"].value("estimated", 0.0), Question(s.value("question", "")),
+      s.value("message", ""));
   return output;
 }
 
@@ -62,6 +86,7 @@ void AddCapture(CommandSet& commands) {
       [options](const CliContext& context) { return RunCaptureCommand(*options, false, context); });
   AddSocketOption(command, options);
   command.add_option("--out", options->session, "session folder to write")->required();
+  AddPlatesOption(command, *options);
 }
 
 void AddResume(CommandSet& commands) {
@@ -71,9 +96,19 @@ void AddResume(CommandSet& commands) {
       [options](const CliContext& context) { return RunCaptureCommand(*options, true, context); });
   AddSocketOption(command, options);
   command.add_option("session", options->session, "session folder")->required();
+  AddPlatesOption(command, *options);
 }
 
 void AddStationControl(CommandSet& commands) {
+  {
+    auto options = std::make_shared<StationOptions>();
+    CLI::App& command = commands.Add(
+        "confirm", "Answer the station: the specimen is off the platter, or back on it",
+        [options](const CliContext&) { return ConfirmCommand(*options); });
+    AddSocketOption(command, options);
+    command.add_flag("--no", options->no,
+                     "it is not: go on without background pictures, or end the capture");
+  }
   {
     auto options = std::make_shared<StationOptions>();
     AddSocketOption(

@@ -76,6 +76,7 @@ Status CaptureService::Resume() {
 }
 
 nlohmann::json CaptureService::ReadStatus() {
+  const auto question = operator_prompt_.Question();
   const MotionStatus motion = station_.motion->ReadStatus();
   const std::lock_guard lock(mutex_);
   std::string state = "idle";
@@ -90,6 +91,7 @@ nlohmann::json CaptureService::ReadStatus() {
                            {"view_count", progress_.view_count},
                            {"message", progress_.message},
                            {"last_picture", progress_.last_picture.string()},
+                           {"question", question ? NameOf(*question) : ""},
                            {"motion", ToJson(motion)},
                            {"failed", nlohmann::json::array()}};
   if (!last_) return status;

@@ -13,14 +13,16 @@
 #include "acquisition/runner/runner.h"
 #include "drivers/base/result.h"
 #include "drivers/station/station.h"
+#include "firmware-host/daemon/operator_prompt.h"
 
 namespace scan {
 
 // idle -> capturing <-> paused -> stopping -> idle; the last outcome stays readable while idle.
 class CaptureService {
  public:
-  // Precondition: `station` outlives the service.
-  explicit CaptureService(Station& station) : station_(station) {}
+  // Precondition: both outlive the service.
+  CaptureService(Station& station, const OperatorPrompt& operator_prompt)
+      : station_(station), operator_prompt_(operator_prompt) {}
   ~CaptureService();  // cancels and waits
 
   // Errors: bad_input while a capture runs.
@@ -31,7 +33,8 @@ class CaptureService {
   Status Resume();
 
   // {"state","outcome","session","views_accepted","views_failed","view_count","message",
-  //  "last_picture","motion":{...},"failed":[{"view","reason"}]}
+  //  "last_picture","question":"" or "remove" or "place" (the specimen; see OperatorPrompt),
+  //  "motion":{...},"failed":[{"view","reason"}]}
   nlohmann::json ReadStatus();
   std::filesystem::path LastPicture();
 
@@ -40,6 +43,7 @@ class CaptureService {
   void Run(CaptureRequest request, std::shared_ptr<CaptureControl> control);
 
   Station& station_;
+  const OperatorPrompt& operator_prompt_;
   std::mutex mutex_;
   std::shared_ptr<CaptureControl> control_;  // while a capture runs
   CaptureProgress progress_;

@@ -10,8 +10,8 @@ Result<Json> Done(const Status& status) {
 
 }  // namespace
 
-RpcFunctions DaemonFunctions(CaptureService& service, RequestMaker make_request,
-                             std::function<void()> on_shutdown) {
+RpcFunctions DaemonFunctions(CaptureService& service, OperatorPrompt& operator_prompt,
+                             RequestMaker make_request, std::function<void()> on_shutdown) {
   RpcFunctions functions;
   functions["capture"] = {
       [&service, make_request](const Json& params, std::stop_token) -> Result<Json> {
@@ -25,6 +25,10 @@ RpcFunctions DaemonFunctions(CaptureService& service, RequestMaker make_request,
   functions["pause"] = {[&service](const Json&, std::stop_token) { return Done(service.Pause()); }};
   functions["resume"] = {
       [&service](const Json&, std::stop_token) { return Done(service.Resume()); }};
+  functions["answer"] = {[&operator_prompt](const Json& params, std::stop_token) {
+    return Done(operator_prompt.Answer(
+        {.confirmed = params.value("confirmed", true), .note = params.value("note", "")}));
+  }};
   functions["status"] = {
       [&service](const Json&, std::stop_token) -> Result<Json> { return service.ReadStatus(); }};
   functions["shutdown"] = {[on_shutdown](const Json&, std::stop_token) -> Result<Json> {

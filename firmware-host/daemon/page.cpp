@@ -83,6 +83,12 @@ Result<std::unique_ptr<Page>> Page::Start(int port, PageBackend backend) {
                 raw->backend.stop();
                 response.set_content("{}", "application/json");
               });
+  server.Post("/api/answer", [raw = impl.get()](const httplib::Request& request,
+                                                httplib::Response& response) {
+    const auto answered = raw->backend.answer(request.get_param_value("confirmed") != "no");
+    if (!answered) response.status = 409;
+    response.set_content("{}", "application/json");
+  });
   impl->port = port == 0 ? server.bind_to_any_port("127.0.0.1")
                          : (server.bind_to_port("127.0.0.1", port) ? port : -1);
   if (impl->port <= 0)

@@ -1,4 +1,5 @@
-// One plain page on loopback: state, progress, the last picture, a stop button.
+// One plain page on loopback: state, progress, the last picture, a stop button, the station's
+// question.
 #pragma once
 
 #include <filesystem>
@@ -14,6 +15,7 @@ namespace scan {
 struct PageBackend {
   std::function<nlohmann::json()> status;               // as the call `status`
   std::function<void()> stop;                           // as the call `stop`
+  std::function<Status(bool confirmed)> answer;         // as the call `answer`
   std::function<std::filesystem::path()> last_picture;  // empty: none yet
 };
 

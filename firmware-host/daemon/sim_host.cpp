@@ -13,12 +13,6 @@
 namespace scan {
 namespace {
 
-// The specimen stands on the middle of its lowest level.
-void PlaceOnFoot(StationConfig& config, const BoundingBox& bounds) {
-  const Eigen::Vector3d centre = bounds.centre();
-  config.sim.placement.pivot_in_model_mm = {centre.x(), centre.y(), bounds.low.z()};
-}
-
 BoundingCylinder CylinderAround(const BoundingBox& bounds, const TableFromModel& table_from_model) {
   BoundingCylinder cylinder{.radius_mm = 0, .z_low_mm = 1e9, .z_high_mm = -1e9};
   for (int corner = 0; corner < 8; ++corner) {
@@ -66,7 +60,7 @@ Result<std::unique_ptr<SimHost>> SimHost::Start(StationConfig config,
   }
   SCAN_TRY(const SimScene scene, MakeSimScene(config.sim.specimen));
   SCAN_TRY(TruthSink truth_sink, MakeTruthSink(truth));
-  PlaceOnFoot(config, scene.specimen_bounds);
+  PlaceOnFoot(config.sim.placement, scene.specimen_bounds);
   SCAN_CHECK(Validate(config));
 
   std::unique_ptr<SimHost> host(new SimHost);

@@ -11,6 +11,7 @@
 #include "drivers/station/sim_station.h"
 #include "drivers/station/station_config.h"
 #include "firmware-host/daemon/sim_scene.h"
+#include "firmware-host/daemon/station_host.h"
 #include "firmware-host/protocol/channel.h"
 
 namespace scan {
@@ -18,18 +19,18 @@ namespace scan {
 // One SimWorld, one virtual clock; motion is reached over the protocol of scanstation-motiond,
 // served by a thread of this process. Only one role works at a time (the runner waits for each
 // answer), so virtual time never runs ahead of a role that still has work to do.
-class SimHost {
+class SimHost final : public StationHost {
  public:
   // `truth` (may be empty): a file that gets one JSON line a frame with the true camera.
   // Errors: bad_input for the configuration or the truth file.
   static Result<std::unique_ptr<SimHost>> Start(StationConfig config,
                                                 const std::filesystem::path& truth);
-  ~SimHost();
+  ~SimHost() override;
 
-  Station& station() { return station_; }
+  Station& station() override { return station_; }
   // Takes the specimen off the platter for the background plates and puts it back.
-  SpecimenPrompt prompt();
-  BoundingCylinder specimen_bounds() const { return specimen_bounds_; }
+  SpecimenPrompt prompt() override;
+  std::optional<BoundingCylinder> specimen_bounds() const override { return specimen_bounds_; }
 
  private:
   SimHost() = default;

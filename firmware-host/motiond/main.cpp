@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 
 #include "drivers/base/clock.h"
+#include "drivers/base/files.h"
 #include "drivers/base/log.h"
+#include "drivers/base/sha256.h"
 #include "drivers/io/gpio/gpiod_lines.h"
 #include "drivers/motion/gpio/gpio_motion.h"
 #include "drivers/motion/real_time.h"
@@ -33,9 +35,11 @@ Status Serve(const std::filesystem::path& config_path, const std::filesystem::pa
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread: all inherit it
 
-  SCAN_TRY(const StationConfig config, LoadStationConfig(config_path));
+  SCAN_TRY(const std::string text, ReadTextFile(config_path));
+  SCAN_TRY(const StationConfig config, ParseStationConfig(text, config_path.string()));
   SCAN_TRY(const std::unique_ptr<Motion> motion, MakeMotion(config));
-  SCAN_TRY(const auto server, ListenForMotion(socket, *motion));
+  SCAN_TRY(const auto server,
+           ListenForMotion(socket, *motion, {config.name, Sha256Hex(AsBytes(text))}));
   Log(LogLevel::info, "ready", {{"socket", socket.string()}, {"station", config.name}});
   int signal = 0;
   sigwait(&signals, &signal);

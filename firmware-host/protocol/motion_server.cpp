@@ -70,8 +70,12 @@ void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop) {
 }
 
 Result<std::unique_ptr<RpcServer>> ListenForMotion(const std::filesystem::path& socket,
-                                                   Motion& motion) {
-  return RpcServer::Start(socket, MotionFunctions(motion), kHeartbeatLimit, OnPeerLost(motion));
+                                                   Motion& motion, const StationIdentity& station) {
+  RpcFunctions functions = MotionFunctions(motion);
+  functions["describe"] = {[station](const Json&, std::stop_token) -> Result<Json> {
+    return Json{{"station", station.name}, {"config_sha256", station.config_sha256}};
+  }};
+  return RpcServer::Start(socket, std::move(functions), kHeartbeatLimit, OnPeerLost(motion));
 }
 
 }  // namespace scan

@@ -1,6 +1,8 @@
 // Serves a Motion to other roles: the core of scanstation-motiond.
 #pragma once
 
+#include <string>
+
 #include "drivers/motion/motion.h"
 #include "firmware-host/protocol/rpc_server.h"
 
@@ -20,9 +22,15 @@ std::function<void()> OnPeerLost(Motion& motion);
 // Serves one peer; when it ends, a motion that runs is stopped.
 void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop);
 
-// Listens on a Unix socket for many peers. Precondition: `motion` outlives the server.
-// Errors: as RpcServer::Start.
+// Which station file the server runs with, so that a client can tell whether it has read the same.
+struct StationIdentity {
+  std::string name;
+  std::string config_sha256;  // of the file's bytes
+};
+
+// Listens on a Unix socket for many peers; `describe` answers with the station. Precondition:
+// `motion` outlives the server. Errors: as RpcServer::Start.
 Result<std::unique_ptr<RpcServer>> ListenForMotion(const std::filesystem::path& socket,
-                                                   Motion& motion);
+                                                   Motion& motion, const StationIdentity& station);
 
 }  // namespace scan

@@ -2,7 +2,7 @@
 # usage: boot.sh LAB RUN SUITE BIN   boots the guest of LAB (see build.sh) and runs SUITE there as root.
 # The guest sees this machine's files read-only with changes kept in its memory, and RUN as /out: what
 # the suite prints goes to RUN/log, the kernel's messages to RUN/dmesg and RUN/console. In the suite
-# $LAB_DIR is tests/lab and $LAB_BIN is BIN. A line '# limit: SECONDS' in the suite limits its time
+# $LAB_DIR is tests/lab, $LAB_BIN is BIN, $LAB_SCENE is RUN/../../scene (see host/station.sh). A line '# limit: SECONDS' in the suite limits its time
 # (default 180). The exit status is the suite's; 124 when it ran out of time, 125 when the guest died.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -12,11 +12,14 @@ rm -rf "$run"
 mkdir -p "$run"
 cp "$suite" "$run/suite.sh"
 cp "$here/guest/main" "$run/main"
-printf 'LAB_DIR=%q\nLAB_BIN=%q\n' "$here" "$bin" >"$run/environment"
+printf 'LAB_DIR=%q\nLAB_BIN=%q\nLAB_SCENE=%q\n' "$here" "$bin" "$(dirname "$(dirname "$run")")/scene" >"$run/environment"
 
-# The guest's processor is emulated: nothing here depends on what the host can virtualise.
+# The guest's processor is emulated, so nothing depends on what the host can virtualise, and its time
+# counts instructions (2 ns each; while it sleeps it jumps to the next timer): what a suite sees does not
+# depend on how busy the host is, and waiting costs nothing. One processor: with more the guest's would
+# run in turns of 100 ms.
 status=0
-timeout "${limit:-180}" qemu-system-x86_64 -M pc -accel tcg,thread=multi -cpu max -smp 2 -m 1024 \
+timeout "${limit:-180}" qemu-system-x86_64 -M pc -accel tcg -icount shift=1,sleep=off -cpu max -smp 1 -m 1024 \
   -nodefaults -no-user-config -display none -no-reboot -serial "file:$run/console" -monitor none \
   -kernel "$lab/vmlinux" -initrd "$lab/initrd.cpio" \
   -fsdev local,id=r,path=/,security_model=none,readonly=on,multidevs=remap \

@@ -14,8 +14,16 @@ namespace {
 class LoopbackPage : public ::testing::Test {
  protected:
   void SetUp() override {
-    page_ = std::move(Page::Start(0, {[] { return nlohmann::json{{"state", "capturing"}}; },
-                                      [this] { ++stops_; }, [this] { return last_picture_; }}))
+    page_ = std::move(Page::Start(0, {[] {
+                                        return nlohmann::json{{"state", "capturing"}};
+                                      },
+                                      [this] { ++stops_; },
+                                      [this](bool confirmed) -> Status {
+                                        if (!asked_) return BadInput("nothing is asked", "", "");
+                                        answers_ += confirmed ? 'y' : 'n';
+                                        return {};
+                                      },
+                                      [this] { return last_picture_; }}))
                 .value();
     client_ = std::make_unique<httplib::Client>("127.0.0.1", page_->port());
   }
@@ -26,6 +34,8 @@ class LoopbackPage : public ::testing::Test {
   TempFolder folder_;
   std::filesystem::path last_picture_;
   std::atomic<int> stops_ = 0;
+  std::atomic<bool> asked_ = true;
+  std::string answers_;  // the page is asked once at a time here
   std::unique_ptr<Page> page_;
   std::unique_ptr<httplib::Client> client_;
 };
@@ -43,6 +53,15 @@ TEST_F(LoopbackPage, ShowsStateAndStops) {
   EXPECT_EQ(stops_, 1);
   EXPECT_EQ(Get("/api/stop")->status, 404) << "a link cannot stop it, only a button";
   EXPECT_EQ(stops_, 1);
+}
+
+TEST_F(LoopbackPage, CarriesTheOperatorsAnswer) {
+  EXPECT_EQ(client_->Post("/api/answer?confirmed=yes")->status, 200);
+  EXPECT_EQ(client_->Post("/api/answer?confirmed=no")->status, 200);
+  EXPECT_EQ(answers_, "yn");
+  asked_ = false;
+  EXPECT_EQ(client_->Post("/api/answer?confirmed=yes")->status, 409);
+  EXPECT_EQ(Get("/api/answer?confirmed=yes")->status, 404) << "a link cannot answer";
 }
 
 TEST_F(LoopbackPage, ShowsTheLastPictureOnceThereIsOne) {

@@ -126,7 +126,7 @@ TEST(MotionProtocol, OnlyTheLossOfTheClientThatMovesStopsTheMotion) {
   TempFolder folder;
   const auto socket = folder.path() / "motion";
   EndlessMotion motion;
-  const auto server = ListenForMotion(socket, motion);
+  const auto server = ListenForMotion(socket, motion, {"lab", "0123"});
   ASSERT_TRUE(server) << ToString(server.error());
   Channel mover(std::move(*ConnectUnix(socket)));
   {
