@@ -96,6 +96,25 @@ struct HeaderFacts {
   std::uint64_t offset = 0;  // of the deflated data
 };
 
+// Value of a line KEY = VALUE of a MetaImage header, blanks about the sign or none; empty without.
+std::string MetaImageValue(std::string_view text, std::string_view key) {
+  constexpr std::string_view kBlanks = " \t\r";
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.size(), text.find('\n', at));
+    const std::string_view line = text.substr(at, end - at);
+    at = end + 1;
+    const std::size_t sign = line.find('=');
+    if (sign == std::string_view::npos || !line.starts_with(key)) continue;
+    if (line.substr(key.size(), sign - key.size()).find_first_not_of(kBlanks) !=
+        std::string_view::npos)
+      continue;
+    const std::size_t first = line.find_first_not_of(kBlanks, sign + 1);
+    if (first == std::string_view::npos) return {};
+    return std::string(line.substr(first, line.find_last_not_of(kBlanks) + 1 - first));
+  }
+  return {};
+}
+
 HeaderFacts MetaImageFacts(const fs::path& path, std::string text) {
   const std::size_t key = text.find("ElementDataFile");
   text.resize(std::min(text.size(), key == std::string::npos ? text.size() : text.find('\n', key)));
@@ -103,17 +122,16 @@ HeaderFacts MetaImageFacts(const fs::path& path, std::string text) {
   facts.has_spacing = text.find("ElementSpacing") != std::string::npos ||
                       text.find("ElementSize") != std::string::npos;
   if (key == std::string::npos) return facts;
-  facts.deflated = text.find("CompressedData = True") != std::string::npos;
-  const std::size_t equals = text.find('=', key);
-  std::string data = equals == std::string::npos ? "" : text.substr(equals + 1);
-  std::erase_if(data, [](char c) { return c == '\r'; });
-  data.erase(0, data.find_first_not_of(' '));
+  const std::string compressed = MetaImageValue(text, "CompressedData");
+  facts.deflated = compressed.starts_with('T') || compressed.starts_with('t') ||
+                   compressed.starts_with('1');  // what MetaIO takes for true
+  const std::string data = MetaImageValue(text, "ElementDataFile");
   if (data == "LOCAL") {
     facts.data = path;
     facts.offset = text.size() + 1;
+  } else if (fs::is_regular_file(path.parent_path() / data)) {
+    facts.data = path.parent_path() / data;  // a list or a pattern of files is left to the reader
   }
-  // A list or a pattern of several files is left to the reader.
-  if (fs::exists(path.parent_path() / data)) facts.data = path.parent_path() / data;
   return facts;
 }
 

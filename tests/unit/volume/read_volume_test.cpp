@@ -101,6 +101,20 @@ TEST_P(EveryFile, GarbageIsBadInput) {
   ExpectBadInput(ReadVolume(path), GetParam());
 }
 
+// Other programs write KEY=VALUE, which MetaIO reads as well.
+TEST(ReadVolume, MetaImageHeadersWithoutBlanks) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "v.mha";
+  ASSERT_TRUE(WriteVolume(path, Sample(), {.type = GreyType::uint16}));
+  std::string text = ReadTextFile(path).value();
+  const std::string compressed = "CompressedData = True";
+  ASSERT_NE(text.find(compressed), std::string::npos);
+  text.replace(text.find(compressed), compressed.size(), "CompressedData=True");
+  text.replace(text.find("ElementDataFile = "), 18, "ElementDataFile=");
+  ASSERT_TRUE(WriteFileDurably(path, std::string_view(text)));
+  ExpectSame(ReadVolume(path), Sample());
+}
+
 TEST(ReadVolume, GivenVoxelSizeOverridesTheFile) {
   const TempFolder folder;
   WriteWithItk(folder.path() / "v.mha", Sample(), Scalar::uint8);
