@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <array>
 #include <cmath>
 
 #include "tests/support/solid_volume.h"
@@ -48,6 +49,14 @@ Segmentation SegmentOrDie(const Volume& volume, const SegmentOptions& options = 
   return s ? std::move(*s) : Segmentation{};
 }
 
+// Gives the voxels low..high - 1 one grey value.
+void SetBlock(Volume& volume, const std::array<std::size_t, 3>& low,
+              const std::array<std::size_t, 3>& high, float grey) {
+  for (std::size_t k = low[2]; k < high[2]; ++k)
+    for (std::size_t j = low[1]; j < high[1]; ++j)
+      for (std::size_t i = low[0]; i < high[0]; ++i) volume.grey[volume.index(i, j, k)] = grey;
+}
+
 constexpr double kBall9 = 4.0 / 3 * 3.14159265 * 9 * 9 * 9;
 
 TEST(Segment, TubeAndFluidAreTakenAwayWithoutAThreshold) {
@@ -64,8 +73,8 @@ TEST(Segment, TubeAndFluidAreTakenAwayWithoutAThreshold) {
 
 TEST(Segment, BridgeToTheTubeIsCutAndTheThinLegStays) {
   Volume volume = InTube(10, 4);
-  for (std::size_t i = 36; i < 54; ++i) volume.grey[volume.index(i, 24, 20)] = 150;  // touches
-  for (std::size_t k = 29; k < 36; ++k) volume.grey[volume.index(29, 24, k)] = 150;  // a leg
+  SetBlock(volume, {36, 24, 20}, {54, 25, 21}, 150);  // touches
+  SetBlock(volume, {29, 24, 29}, {30, 25, 36}, 150);  // a leg
   const Segmentation s = SegmentOrDie(volume);
   EXPECT_NEAR(static_cast<double>(s.voxels), kBall9, 0.08 * kBall9);
   EXPECT_TRUE(s.specimen.inside[s.specimen.index(29, 24, 35)]);
@@ -74,9 +83,7 @@ TEST(Segment, BridgeToTheTubeIsCutAndTheThinLegStays) {
 
 TEST(Segment, EachStepCanBeSwitchedOff) {
   Volume volume = InTube(10, 4);
-  for (std::size_t k = 19; k < 23; ++k)
-    for (std::size_t j = 23; j < 27; ++j)
-      for (std::size_t i = 27; i < 31; ++i) volume.grey[volume.index(i, j, k)] = 5;
+  SetBlock(volume, {27, 23, 19}, {31, 27, 23}, 5);
   SegmentOptions options;
   const Segmentation all = SegmentOrDie(volume, options);
   EXPECT_EQ(all.cavity_voxels, 64u);
@@ -92,10 +99,8 @@ TEST(Segment, EachStepCanBeSwitchedOff) {
 
 TEST(Segment, LeakingCavityIsFilledUpToTheLeakRadius) {
   Volume volume = InTube(10, 0);
-  for (std::size_t k = 17; k < 25; ++k)
-    for (std::size_t j = 21; j < 29; ++j)
-      for (std::size_t i = 25; i < 33; ++i) volume.grey[volume.index(i, j, k)] = 10;
-  for (std::size_t i = 25; i < 44; ++i) volume.grey[volume.index(i, 25, 20)] = 10;  // the leak
+  SetBlock(volume, {25, 21, 17}, {33, 29, 25}, 10);
+  SetBlock(volume, {25, 25, 20}, {44, 26, 21}, 10);  // the leak
   SegmentOptions options;
   options.exterior.leak_radius = 0;
   EXPECT_EQ(SegmentOrDie(volume, options).cavity_voxels, 0u);
