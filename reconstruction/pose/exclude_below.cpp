@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "reconstruction/pose/nominal_pose.h"
 
@@ -21,6 +22,9 @@ double HeightAtAxis(const Eigen::Vector3d& from, const Eigen::Vector3d& along) {
 }  // namespace
 
 Status ExcludeBelow(const PhotoSet& photos, double height_mm, std::vector<Mask>& masks) {
+  if (!std::isfinite(height_mm))
+    return BadInput("the height is not a number", "--exclude-below-mm",
+                    "give mm above the platter");
   std::vector<CameraFromTable> cameras;
   for (const Photo& photo : photos.photos) {
     const auto camera = NominalCameraFromTable(photos, photo);

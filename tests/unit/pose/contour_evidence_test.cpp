@@ -48,9 +48,7 @@ TEST(ContourResidual, DerivativeAgreesWithDifferences) {
 TEST(MatchContour, FindsTheBiasOfTheMaskAndTheShiftOfThePicture) {
   const TriangleMesh mesh = test::BugMesh(3);
   const ContourMesh contour_mesh(mesh);
-  ViewState state;
-  state.camera_from_model = CameraFromModel(ExpSo3({1.7, 0.2, 0.4}), Eigen::Vector3d(0, 0, 550));
-  state.intrinsics = {924, 612, 2740, 2740, 462, 306, 0, 0, 0, 0, 0};
+  ViewState state = test::BugView();
   const PhotoContour photo =
       MakePhotoContour(test::RenderMask(mesh, state.camera_from_model, state.intrinsics));
   state.intrinsics.cx += 3;  // the model's picture lies 3 px to the right of the photo's

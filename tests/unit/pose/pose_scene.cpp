@@ -66,6 +66,13 @@ TriangleMesh BugMesh(int subdivisions) {
   return mesh;
 }
 
+ViewState BugView() {
+  ViewState state;
+  state.camera_from_model = CameraFromModel(ExpSo3({1.7, 0.2, 0.4}), Eigen::Vector3d(0, 0, 550));
+  state.intrinsics = {924, 612, 2740, 2740, 462, 306, 0, 0, 0, 0, 0};
+  return state;
+}
+
 TriangleMesh RevolutionMesh(int facets, const Eigen::Vector3d& axis) {
   // A profile like a pear, closed at both poles.
   constexpr int kRings = 120;

@@ -7,6 +7,7 @@
 #include "acquisition/session/photo_set.h"
 #include "reconstruction/masks/mask.h"
 #include "reconstruction/mesh/mesh.h"
+#include "reconstruction/pose/contour_evidence.h"
 
 namespace scan::test {
 
@@ -38,6 +39,9 @@ Scene MakeScene(const TriangleMesh& mesh, const TableFromModel& table_from_model
 
 // An egg-shaped body with a horn and five unequal legs, 30 mm long: overlapping closed shells.
 TriangleMesh BugMesh(int subdivisions);
+
+// The bug from 550 mm in a picture of 924 x 612, no mask bias.
+ViewState BugView();
 
 // A closed body of revolution about an axis that is not a coordinate axis; `facets` around.
 TriangleMesh RevolutionMesh(int facets, const Eigen::Vector3d& axis);

@@ -12,13 +12,7 @@
 namespace scan {
 namespace {
 
-test::SceneOptions SmallScene() {
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 8;
-  return options;
-}
+const test::SceneOptions kSmall{.w = 924, .h = 612, .views = 8};
 
 TableFromModel SomePlacing() {
   return TableFromModel(ExpSo3({0.05, -0.1, 1.9}), Eigen::Vector3d(1.5, -2, 3));
@@ -41,7 +35,7 @@ PoseError ErrorOf(const TriangleMesh& mesh, const test::Scene& scene, const Pose
 
 TEST(SolveJoint, StaticRigErrorsFromNominalPoses) {
   const TriangleMesh mesh = test::BugMesh(3);
-  test::SceneOptions options = SmallScene();
+  test::SceneOptions options = kSmall;
   options.static_errors = true;
   const test::Scene scene = test::MakeScene(mesh, SomePlacing(), options);
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, NearPlacing());
@@ -59,7 +53,7 @@ TEST(SolveJoint, StaticRigErrorsFromNominalPoses) {
 
 TEST(SolveJoint, TheBiasOfDilatedMasksIsFound) {
   const TriangleMesh mesh = test::BugMesh(3);
-  test::Scene scene = test::MakeScene(mesh, SomePlacing(), SmallScene());
+  test::Scene scene = test::MakeScene(mesh, SomePlacing(), kSmall);
   for (Mask& mask : scene.masks) {
     // A box of 3 x 3 on an anti-aliased edge moves it by 1 px along the axes, more on diagonals.
     cv::Mat wide;
@@ -75,7 +69,7 @@ TEST(SolveJoint, TheBiasOfDilatedMasksIsFound) {
 
 TEST(SolveJoint, SameBytesForAnyNumberOfThreads) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::SceneOptions options = SmallScene();
+  test::SceneOptions options = kSmall;
   options.views = 4;
   options.static_errors = true;
   const test::Scene scene = test::MakeScene(mesh, SomePlacing(), options);
@@ -94,7 +88,7 @@ TEST(SolveJoint, SameBytesForAnyNumberOfThreads) {
 
 TEST(SolveJoint, OneEmptyMaskRejectsItsViewOnly) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::Scene scene = test::MakeScene(mesh, SomePlacing(), SmallScene());
+  test::Scene scene = test::MakeScene(mesh, SomePlacing(), kSmall);
   scene.masks[3].coverage.setTo(0);
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, NearPlacing());
   ASSERT_TRUE(poses) << ToString(poses.error());
@@ -107,7 +101,7 @@ TEST(SolveJoint, OneEmptyMaskRejectsItsViewOnly) {
 
 TEST(SolveJoint, AMaskOfAnotherViewIsRejectedAndDoesNotSpread) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::Scene scene = test::MakeScene(mesh, SomePlacing(), SmallScene());
+  test::Scene scene = test::MakeScene(mesh, SomePlacing(), kSmall);
   scene.masks[2] = scene.masks[7];
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, NearPlacing());
   ASSERT_TRUE(poses) << ToString(poses.error());
@@ -128,7 +122,7 @@ void ExpectRefused(const TriangleMesh& mesh, const PhotoSet& photos, const std::
 
 TEST(SolveJoint, BadInputIsRefusedWithAReason) {
   const TriangleMesh mesh = test::BugMesh(0);
-  test::SceneOptions options = SmallScene();
+  test::SceneOptions options = kSmall;
   options.w = 200;
   options.h = 150;
   options.views = 2;
@@ -156,7 +150,7 @@ TEST(SolveJoint, BadInputIsRefusedWithAReason) {
 
 TEST(SolveJoint, StopsWhenAsked) {
   const TriangleMesh mesh = test::BugMesh(1);
-  const test::Scene scene = test::MakeScene(mesh, SomePlacing(), SmallScene());
+  const test::Scene scene = test::MakeScene(mesh, SomePlacing(), kSmall);
   std::stop_source source;
   source.request_stop();
   const auto poses =

@@ -13,13 +13,7 @@
 namespace scan {
 namespace {
 
-test::SceneOptions Small() {
-  test::SceneOptions options;
-  options.w = 462;
-  options.h = 306;
-  options.views = 6;
-  return options;
-}
+const test::SceneOptions kSmall{.w = 462, .h = 306, .views = 6};
 
 const TableFromModel kPlacing(ExpSo3({0.1, -0.15, 1.3}), Eigen::Vector3d(1.5, -2, 1));
 
@@ -49,7 +43,7 @@ TEST(RefineView, ReturnsFromAFewDegreesAndMillimetres) {
 
 TEST(SolveJoint, PhotographsWithoutAPoseJoinThroughTheModel) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::Scene scene = test::MakeScene(mesh, kPlacing, Small());
+  test::Scene scene = test::MakeScene(mesh, kPlacing, kSmall);
   ForgetPose(scene.photos.photos[1]);
   ForgetPose(scene.photos.photos[4]);
   scene.photos.approx_distance_mm = 550;
@@ -72,9 +66,7 @@ TEST(SolveJoint, PhotographsWithoutAPoseJoinThroughTheModel) {
 
 TEST(SolveJoint, WithoutAnyPriorEveryPhotographIsFoundAlone) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::SceneOptions small = Small();
-  small.views = 2;
-  const test::Scene scene = test::MakeScene(mesh, kPlacing, small);
+  const test::Scene scene = test::MakeScene(mesh, kPlacing, {.w = 462, .h = 306, .views = 2});
   JointOptions options;
   options.no_priors = true;  // and no distance: it follows from the size
   options.start.subdivisions = 3;
@@ -118,7 +110,7 @@ TEST(CorrelationLength, FindsTheIntegralOfTheAutocorrelation) {
 
 TEST(ExcludeBelow, IgnoresWhatStandsBelowAHeightOnTheAxis) {
   const TriangleMesh mesh = test::BugMesh(1);
-  test::Scene scene = test::MakeScene(mesh, kPlacing, Small());
+  test::Scene scene = test::MakeScene(mesh, kPlacing, kSmall);
   ASSERT_TRUE(ExcludeBelow(scene.photos, 3.0, scene.masks));
   for (std::size_t i = 0; i < scene.masks.size(); ++i) {
     const Photo& photo = scene.photos.photos[i];
@@ -134,6 +126,7 @@ TEST(ExcludeBelow, IgnoresWhatStandsBelowAHeightOnTheAxis) {
     EXPECT_TRUE(ignored(1.5));
     EXPECT_FALSE(ignored(4.5));
   }
+  EXPECT_FALSE(ExcludeBelow(scene.photos, std::nan(""), scene.masks));
   ForgetPose(scene.photos.photos[0]);
   const Status status = ExcludeBelow(scene.photos, 3.0, scene.masks);
   ASSERT_FALSE(status);
@@ -143,9 +136,7 @@ TEST(ExcludeBelow, IgnoresWhatStandsBelowAHeightOnTheAxis) {
 TEST(MatchContour, AnIgnoredRegionNeedsNoPartner) {
   const TriangleMesh mesh = test::BugMesh(2);
   const ContourMesh contour_mesh(mesh);
-  ViewState state;
-  state.camera_from_model = CameraFromModel(ExpSo3({1.7, 0.2, 0.4}), Eigen::Vector3d(0, 0, 550));
-  state.intrinsics = {924, 612, 2740, 2740, 462, 306, 0, 0, 0, 0, 0};
+  const ViewState state = test::BugView();
   Mask mask = test::RenderMask(mesh, state.camera_from_model, state.intrinsics);
   // The left half of the specimen is missing in the photograph.
   mask.coverage(cv::Rect(0, 0, 462, 612)).setTo(0);
