@@ -90,6 +90,9 @@ struct Poses {
   std::vector<std::string> notes;  // sentences for the report: what the data cannot show and why
 };
 
+// The solved camera of a view's lens state; `nominal` where the method solves none.
+const Intrinsics& IntrinsicsOf(const Poses& poses, const ViewPose& view, const Intrinsics& nominal);
+
 // poses.json. Errors of reading: bad_input with file and field.
 Status WritePoses(const std::filesystem::path& path, const Poses& poses);
 Result<Poses> ReadPoses(const std::filesystem::path& path);

@@ -246,4 +246,10 @@ Result<Poses> ReadPoses(const std::filesystem::path& path) {
   return poses;
 }
 
+const Intrinsics& IntrinsicsOf(const Poses& poses, const ViewPose& view,
+                               const Intrinsics& nominal) {
+  const auto lens = poses.lens_states.find(view.lens_state);
+  return lens != poses.lens_states.end() ? lens->second.intrinsics : nominal;
+}
+
 }  // namespace scan

@@ -119,12 +119,12 @@ std::string FreeDirectionsList(const Poses& poses) {
   std::string html = "<p>The photographs do not determine:</p><ul>\n";
   for (const FreeDirection& f : poses.free_directions)
     html += fmt::format(
-        "<li>{} of {} {} about the axis ({:.3f}, {:.3f}, {:.3f}) through ({:.2f}, {:.2f}, {:.2f}) "
+        "<li>{} of {} {} {} the axis ({:.3f}, {:.3f}, {:.3f}) through ({:.2f}, {:.2f}, {:.2f}) "
         "mm"
         " of the model frame; held by: {}</li>\n",
         kKinds[static_cast<int>(f.kind)], kScopes[static_cast<int>(f.scope)], Escaped(f.of),
-        f.axis.x(), f.axis.y(), f.axis.z(), f.point.x(), f.point.y(), f.point.z(),
-        Escaped(f.held_by));
+        f.kind == FreeDirection::Kind::rotation ? "about" : "along", f.axis.x(), f.axis.y(),
+        f.axis.z(), f.point.x(), f.point.y(), f.point.z(), Escaped(f.held_by));
   return html + "</ul>\n";
 }
 
@@ -136,10 +136,7 @@ Result<std::string> ViewHtml(const ReportInput& input, std::size_t index) {
   if (picture.empty())
     return BadInput("cannot read the photograph", photo.path.string(), "check the file");
   const bool solved = view.status == ViewStatus::accepted;
-  const auto lens = input.poses->lens_states.find(view.lens_state);
-  const Intrinsics& intrinsics = lens != input.poses->lens_states.end()
-                                     ? lens->second.intrinsics
-                                     : input.photos->intrinsics(photo);
+  const Intrinsics& intrinsics = IntrinsicsOf(*input.poses, view, input.photos->intrinsics(photo));
   const bool has_pose = view.camera_from_model.translation().z() > 0;
 
   const cv::Mat& photo_mask = input.masks[index].coverage;

@@ -68,9 +68,7 @@ Result<ViewToProject> ReadView(const PhotoSet& photos, std::size_t i, const View
                                const Poses& poses, const Mask& mask) {
   const Photo& photo = photos.photos[i];
   ViewToProject view;
-  const auto lens = poses.lens_states.find(pose.lens_state);
-  view.intrinsics =
-      lens == poses.lens_states.end() ? photos.intrinsics(photo) : lens->second.intrinsics;
+  view.intrinsics = IntrinsicsOf(poses, pose, photos.intrinsics(photo));
   view.camera_from_model = pose.camera_from_model;
   view.mask = &mask;
   view.index = static_cast<std::uint16_t>(i);
