@@ -29,13 +29,18 @@ ModelFromModel TurnAbout(const FreeDirection& free, double angle) {
   return ModelFromModel(turn, free.point - turn * free.point);
 }
 
+bool Concerns(const FreeDirection& free, const ViewPose& view) {
+  if (free.kind != FreeDirection::Kind::rotation) return false;
+  return free.of == (free.scope == FreeDirection::Scope::view ? view.name : view.mounting);
+}
+
 // The one angle about a free axis that most views agree on: of the views' own angles the one with
 // the least sum of differences from all others.
 double CommonTurn(const PoseTrial& trial, const Poses& poses, const FreeDirection& free) {
   std::vector<double> angles;
   for (std::size_t i = 0; i < poses.views.size(); ++i) {
     const ViewPose& view = poses.views[i];
-    if (view.status != ViewStatus::accepted || view.mounting != free.of) continue;
+    if (view.status != ViewStatus::accepted || !Concerns(free, view)) continue;
     const Eigen::Matrix3d error =
         trial.truth[i].camera_from_model.rotation().transpose() * view.camera_from_model.rotation();
     angles.push_back(TwistAbout(free.axis.normalized(), error));
@@ -96,10 +101,7 @@ MethodFigures ScorePoses(const PoseTrial& trial, const Poses& poses,
   figures.free_directions = poses.free_directions;
   figures.views.resize(poses.views.size());
   std::vector<double> turns;
-  for (const FreeDirection& direction : free)
-    turns.push_back(direction.kind == FreeDirection::Kind::rotation
-                        ? CommonTurn(trial, poses, direction)
-                        : 0.0);
+  for (const FreeDirection& direction : free) turns.push_back(CommonTurn(trial, poses, direction));
   tbb::parallel_for(std::size_t{0}, poses.views.size(), [&](std::size_t i) {
     const ViewPose& view = poses.views[i];
     ViewFigures& f = figures.views[i];
@@ -108,16 +110,14 @@ MethodFigures ScorePoses(const PoseTrial& trial, const Poses& poses,
     f.reason = view.reason;
     f.cost_px = view.cost_px;
     f.cost_l1_px = view.cost_l1_px;
-    const auto lens = poses.lens_states.find(view.lens_state);
-    const Intrinsics intrinsics = lens != poses.lens_states.end()
-                                      ? lens->second.intrinsics
-                                      : trial.photos.intrinsics(trial.photos.photos[i]);
+    const Intrinsics& intrinsics =
+        IntrinsicsOf(poses, view, trial.photos.intrinsics(trial.photos.photos[i]));
     f.error = ScorePose(trial.surface, trial.truth[i], PoseOf{view.camera_from_model, intrinsics});
     f.turned = f.error;
     CameraFromModel turned = view.camera_from_model;
     bool moved = false;
     for (std::size_t k = 0; k < free.size(); ++k) {
-      if (turns[k] == 0 || free[k].of != view.mounting) continue;
+      if (!Concerns(free[k], view)) continue;
       turned = turned * TurnAbout(free[k], -turns[k]);
       moved = true;
     }

@@ -50,9 +50,10 @@ struct MethodFigures {
 };
 
 // Compares with the truth. What nobody can see is not held against anyone: for each rotation in
-// `free` (model frame) one turn about its axis, common to all accepted views of its mounting, is
-// taken off in `turned`; without any, `turned` equals `error`. Thread contract: pure; parallel
-// inside; the same bytes for any number of threads. Precondition: one view per photo.
+// `free` (model frame) one turn about its axis, common to all accepted views of its mounting (or of
+// its one view, as it says), is taken off in `turned`; without any, `turned` equals `error`. Thread
+// contract: pure; parallel inside; the same bytes for any number of threads. Precondition: one view
+// per photo.
 MethodFigures ScorePoses(const PoseTrial& trial, const Poses& poses,
                          std::span<const FreeDirection> free);
 

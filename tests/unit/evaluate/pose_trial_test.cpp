@@ -90,6 +90,19 @@ TEST(ScorePoses, ViewsThatDisagreeAboutAFreeTurnStayWrong) {
   EXPECT_LT(figures.views[0].turned.surface_rms_px, 1e-6);
 }
 
+TEST(ScorePoses, AFreeTurnOfOneViewIsTakenOffThereOnly) {
+  Case c = MakeCase();
+  for (const std::size_t i : {1, 2})
+    c.poses.views[i].camera_from_model = TurnedBy(c.poses.views[i].camera_from_model, 1.5);
+  FreeDirection free = FreeTurn();
+  free.scope = FreeDirection::Scope::view;
+  free.of = c.poses.views[2].name;
+  const MethodFigures figures = ScorePoses(c.trial, c.poses, std::span(&free, 1));
+  EXPECT_LT(figures.views[2].turned.surface_rms_px, 1e-6);
+  EXPECT_GT(figures.views[1].turned.surface_rms_px, 5);
+  EXPECT_EQ(Summarise(figures, 5).wrong, 1u);
+}
+
 TEST(ScorePoses, RejectedViewsCountNowhere) {
   Case c = MakeCase();
   c.poses.views[1].camera_from_model = TurnedBy(c.poses.views[1].camera_from_model, 1);
