@@ -1,11 +1,13 @@
 #include "reconstruction/evaluate/calibrated.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/SVD>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "acquisition/session/json_fields.h"
 #include "drivers/base/files.h"
 #include "drivers/base/units.h"
 #include "reconstruction/pose/contour_evidence.h"
@@ -18,14 +20,7 @@ namespace {
 constexpr double kWindowPx = 25;
 constexpr double kSpacingPx = 2;
 
-CameraFromModel PoseOfRows(const nlohmann::json& rows) {
-  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 4; ++c)
-      isometry.matrix()(r, c) =
-          rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
-  return CameraFromModel(isometry);
-}
+constexpr int kLargestSide = 1 << 20;  // px
 
 struct Pair {
   Eigen::Matrix3d solved, calibrated;
@@ -102,21 +97,22 @@ std::vector<MovedParameter> MovedLens(const Poses& poses, const PhotoSet& photos
 
 Result<CalibratedCameras> ReadCalibrated(const std::filesystem::path& path) {
   SCAN_TRY(const std::string text, ReadTextFile(path));
+  SCAN_TRY(const nlohmann::json json, ParseJson(text, path.string()));
+  SCAN_TRY(const JsonObject root, JsonObject::Root(json, path.string()));
   CalibratedCameras cameras;
-  try {
-    const auto json = nlohmann::json::parse(text);
-    Intrinsics& in = cameras.intrinsics;
-    in.w = json.at("w").get<int>();
-    in.h = json.at("h").get<int>();
-    in.fl_x = json.at("fx").get<double>();
-    in.fl_y = json.at("fy").get<double>();
-    in.cx = json.at("cx").get<double>();
-    in.cy = json.at("cy").get<double>();
-    for (const auto& [name, rows] : json.at("views").items())
-      cameras.views[name] = PoseOfRows(rows);
-  } catch (const nlohmann::json::exception& e) {
-    return BadInput(std::string("not a file of calibrated cameras (") + e.what() + ")",
-                    path.string(), "give fx, fy, cx, cy, w, h and views: 3 rows of 4 by name");
+  Intrinsics& in = cameras.intrinsics;
+  SCAN_TRY(in.w, root.Int("w", 1, kLargestSide));
+  SCAN_TRY(in.h, root.Int("h", 1, kLargestSide));
+  SCAN_TRY(in.fl_x, root.Number("fx"));
+  SCAN_TRY(in.fl_y, root.Number("fy"));
+  SCAN_TRY(in.cx, root.Number("cx"));
+  SCAN_TRY(in.cy, root.Number("cy"));
+  if (!(in.fl_x > 0 && in.fl_y > 0))
+    return root.Wrong("fx", "focal length not positive", "give fx and fy in px");
+  SCAN_TRY(const JsonObject views, root.Object("views"));
+  for (const std::string& name : views.Keys()) {
+    SCAN_TRY(const Eigen::Isometry3d pose, views.Rigid(name));
+    cameras.views[name] = CameraFromModel(pose);
   }
   return cameras;
 }
@@ -135,12 +131,16 @@ Result<CalibratedFigures> CompareWithCalibrated(const Poses& poses, const Calibr
     const auto known = truth.views.find(view.name);
     if (known == truth.views.end()) continue;
     pairs.push_back({view.camera_from_model.rotation(), known->second.rotation()});
-    const auto lens = poses.lens_states.find(view.lens_state);
-    solved[i] = PoseOf{view.camera_from_model, lens != poses.lens_states.end()
-                                                   ? lens->second.intrinsics
-                                                   : photos.intrinsics(photos.photos[i])};
+    solved[i] = PoseOf{view.camera_from_model,
+                       IntrinsicsOf(poses, view, photos.intrinsics(photos.photos[i]))};
     calibrated[i] = PoseOf{known->second, truth.intrinsics};
   }
+  for (const LensState& lens : photos.lens_states)
+    if (lens.intrinsics.w != truth.intrinsics.w || lens.intrinsics.h != truth.intrinsics.h)
+      return BadInput(
+          fmt::format("calibrated for pictures of {} x {}, the photographs are {} x {}",
+                      truth.intrinsics.w, truth.intrinsics.h, lens.intrinsics.w, lens.intrinsics.h),
+          "truth", "give the calibration of these very pictures");
   if (pairs.size() < 3)
     return BadInput("fewer than three accepted views have a calibrated camera", "truth",
                     "names in the truth are the photographs' base names");

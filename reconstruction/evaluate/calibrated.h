@@ -42,14 +42,15 @@ struct CalibratedFigures {
                                    // with one aim
   std::vector<MovedParameter> lens;
   Spread contour_px;             // |distance| of the mesh's outline to the photograph's
-  Spread contour_calibrated_px;  // the same at the calibrated poses
+  Spread contour_calibrated_px;  // the same at the calibrated poses; means something only where
+                                 // their model frame is the mesh's
 };
 
 // Accepted views that `truth` names are compared, in the order of `photos`. Contour distances are
 // along the outline's normal, where the photograph's evidence is; pieces without a partner within
 // 25 px count as that. Preconditions: one view and one mask per photo.
-// Errors: bad_input when fewer than three views can be compared. Thread contract: pure; parallel
-// inside.
+// Errors: bad_input when fewer than three views can be compared or the calibration is of pictures
+// of another size. Thread contract: pure; parallel inside.
 Result<CalibratedFigures> CompareWithCalibrated(const Poses& poses, const CalibratedCameras& truth,
                                                 const TriangleMesh& mesh, const PhotoSet& photos,
                                                 std::span<const Mask> masks);
