@@ -63,10 +63,8 @@ Result<std::vector<ChosenStart>> ChooseStarts(const ContourMesh& mesh, RigModel&
                                               const std::vector<bool>& known,
                                               const StartOptions& search,
                                               const RefineOptions& refine, std::stop_token stop) {
-  const TriangleMesh coarse_triangles = ClusteredMesh(mesh.mesh, mesh.radius_mm / 50);
-  const bool coarser = coarse_triangles.faces.size() > 1000 &&
-                       2 * coarse_triangles.faces.size() < mesh.mesh.faces.size();
-  const ContourMesh coarse(coarser ? coarse_triangles : mesh.mesh);
+  const TriangleMesh coarse_triangles = MeshForRoughSteps(mesh);
+  const ContourMesh coarse(coarse_triangles);
   const double unit = refine.last_window_px / 8;  // 1 at 1848 px
   std::vector<ChosenStart> chosen(rig.mounting_ids().size());
   for (std::size_t m = 0; m < chosen.size(); ++m) {

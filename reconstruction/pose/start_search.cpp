@@ -222,6 +222,13 @@ TriangleMesh ClusteredMesh(const TriangleMesh& mesh, double cell_mm) {
   return clustered;
 }
 
+TriangleMesh MeshForRoughSteps(const ContourMesh& mesh) {
+  TriangleMesh coarse = ClusteredMesh(mesh.mesh, mesh.radius_mm / 50);
+  const bool coarser =
+      coarse.faces.size() > 1000 && 2 * coarse.faces.size() < mesh.mesh.faces.size();
+  return coarser ? coarse : mesh.mesh;
+}
+
 std::vector<StartCandidate> SearchStarts(const ContourMesh& mesh, const RigModel& rig,
                                          std::span<const PhotoContour> photos,
                                          const std::vector<bool>& use, const StartOptions& options,

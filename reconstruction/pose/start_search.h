@@ -45,6 +45,10 @@ std::vector<StartCandidate> SearchStarts(const ContourMesh& mesh, const RigModel
 // The mesh with the vertices of each cell of a grid merged: for small pictures.
 TriangleMesh ClusteredMesh(const TriangleMesh& mesh, double cell_mm);
 
+// The mesh clustered to a hundredth of its size, for refining many candidates; the mesh itself
+// where that saves less than half of the faces.
+TriangleMesh MeshForRoughSteps(const ContourMesh& mesh);
+
 // Unit vectors of a subdivided icosahedron: 10 * 4^subdivisions + 2 of them.
 std::vector<Eigen::Vector3d> IcosphereDirections(int subdivisions);
 

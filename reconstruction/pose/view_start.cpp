@@ -26,13 +26,6 @@ Eigen::Matrix3d PrincipalAxes(const TriangleMesh& mesh, const Eigen::Vector3d& c
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moment).eigenvectors();
 }
 
-TriangleMesh CoarseOf(const ContourMesh& mesh) {
-  TriangleMesh coarse = ClusteredMesh(mesh.mesh, mesh.radius_mm / 50);
-  const bool coarser =
-      coarse.faces.size() > 1000 && 2 * coarse.faces.size() < mesh.mesh.faces.size();
-  return coarser ? coarse : mesh.mesh;
-}
-
 // A step of Gauss-Newton, held where the contour says nothing.
 Vector6d Step(const CondensedEvidence& evidence, double distance_mm) {
   Matrix6d H = evidence.H.topLeftCorner<6, 6>();
@@ -90,7 +83,7 @@ ViewSearch::ViewSearch(const ContourMesh& mesh, double distance_mm, const StartO
       distance_mm_(distance_mm > 0 ? distance_mm : kFarRadii * mesh.radius_mm),
       search_(search),
       options_(options),
-      coarse_triangles_(CoarseOf(mesh)),
+      coarse_triangles_(MeshForRoughSteps(mesh)),
       coarse_(coarse_triangles_),
       principal_axes_(PrincipalAxes(mesh.mesh, mesh.centre)) {
   const std::vector<Eigen::Vector3d> directions = IcosphereDirections(search.subdivisions);
