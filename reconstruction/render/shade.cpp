@@ -29,8 +29,8 @@ struct View {
   Intrinsics camera;
 };
 
-// Looks along `forward` at `box` in axes `right`, `down`; the picture just holds what spans
-// `half_width_mm` and `half_height_mm`.
+// Looks at `centre` from `distance` along the third column of `right_down_forward`; the picture
+// just holds what spans the half width and height about it.
 View LookAlong(const Eigen::Matrix3d& right_down_forward, const Vector3d& centre, double distance,
                double half_width_mm, double half_height_mm, int height_px) {
   View v;
