@@ -7,6 +7,7 @@
 #include "drivers/base/units.h"
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/cli/demo_capture.h"
+#include "firmware-host/cli/figures.h"
 #include "firmware-host/cli/truth.h"
 #include "reconstruction/pipeline/pipeline.h"
 #include "reconstruction/specimens/specimen.h"
@@ -24,10 +25,6 @@ struct DemoOptions {
   bool force = false;
 };
 
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 struct DemoScore {
   Spread centre_mm, rotation_deg, surface_px;
 };
@@ -41,20 +38,14 @@ Result<DemoScore> ScoreDemo(const DemoPaths& paths, const std::string& specimen_
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const ViewPose& view = result.poses.views[i];
     if (view.status != ViewStatus::accepted) continue;
-    const auto lens = result.poses.lens_states.find(view.lens_state);
-    const Intrinsics intrinsics = lens != result.poses.lens_states.end()
-                                      ? lens->second.intrinsics
-                                      : result.photos.intrinsics(result.photos.photos[i]);
+    const Intrinsics& intrinsics =
+        IntrinsicsOf(result.poses, view, result.photos.intrinsics(result.photos.photos[i]));
     const PoseError error = ScorePose(exact, truth[i], {view.camera_from_model, intrinsics});
     centres.push_back(error.centre_mm);
     rotations.push_back(DegFromRad(error.rotation_rad));
     surfaces.push_back(error.surface_median_px);
   }
   return DemoScore{SpreadOf(centres), SpreadOf(rotations), SpreadOf(surfaces)};
-}
-
-Json ToJson(const Spread& spread) {
-  return {{"median", spread.median}, {"p95", spread.p95}, {"max", spread.max}};
 }
 
 CommandOutput MakeOutput(const DemoPaths& paths, const ReconstructResult& result,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "firmware-host/cli/figures.h"
 #include "reconstruction/evaluate/calibrated.h"
 #include "reconstruction/mesh/mesh_io.h"
 #include "reconstruction/pipeline/pipeline.h"
@@ -10,8 +11,6 @@ namespace scan {
 namespace {
 
 namespace fs = std::filesystem;
-
-Json SpreadJson(const Spread& s) { return {{"median", s.median}, {"p95", s.p95}, {"max", s.max}}; }
 
 std::string Row(const char* name, const Spread& s) {
   return fmt::format("  {:<40} {:8.3f} {:8.3f} {:8.3f}\n", name, s.median, s.p95, s.max);
@@ -34,12 +33,12 @@ CommandOutput OutputOf(const CalibratedFigures& f) {
   }
   output.json = {{"views", f.views},
                  {"accepted", f.accepted},
-                 {"rotation_between_neighbours_deg", SpreadJson(f.neighbour_deg)},
-                 {"rotation_after_alignment_deg", SpreadJson(f.aligned_deg)},
+                 {"rotation_between_neighbours_deg", ToJson(f.neighbour_deg)},
+                 {"rotation_after_alignment_deg", ToJson(f.aligned_deg)},
                  {"axis_deg", f.axis_deg ? Json(*f.axis_deg) : Json()},
                  {"lens", lens},
-                 {"contour_px", SpreadJson(f.contour_px)},
-                 {"contour_calibrated_px", SpreadJson(f.contour_calibrated_px)}};
+                 {"contour_px", ToJson(f.contour_px)},
+                 {"contour_calibrated_px", ToJson(f.contour_calibrated_px)}};
   output.text = fmt::format("{} of {} views accepted\n{:<42} {:>8} {:>8} {:>8}\n", f.accepted,
                             f.views, "", "median", "p95", "max") +
                 Row("rotation between neighbours, deg", f.neighbour_deg) +
@@ -71,6 +70,11 @@ Result<CommandOutput> EvaluateModel(const EvaluateModelOptions& options,
     return BadInput(
         fmt::format("{} poses for {} photographs", poses.views.size(), photos.photos.size()),
         poses_file.string(), "give the session that these poses were found for");
+  for (std::size_t i = 0; i < photos.photos.size(); ++i)
+    if (photos.photos[i].name != poses.views[i].name)
+      return BadInput(fmt::format("the pose of '{}' where the session has '{}'",
+                                  poses.views[i].name, photos.photos[i].name),
+                      poses_file.string(), "give the session that these poses were found for");
   StageOptions stages;
   stages.exclude_below_mm = options.exclude_below_mm;
   SCAN_TRY(const std::vector<Mask> masks,
