@@ -1,7 +1,10 @@
 // What every subcommand shares: global options, progress, the way results are printed.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <stop_token>
@@ -28,6 +31,16 @@ struct CommandOutput {
 };
 
 using CommandFn = std::function<Result<CommandOutput>(const CliContext&)>;
+
+// A finite number above zero (CLI11's own check lets NaN pass and prints the largest double).
+inline CLI::Validator Positive() {
+  const auto check = [](const std::string& text) -> std::string {
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && value > 0 && std::isfinite(value);
+    return good ? "" : fmt::format("'{}' is not a positive number", text);
+  };
+  return CLI::Validator(check, "POSITIVE", "positive");
+}
 
 // Adds a subcommand; its options are bound by the caller to variables that `run` owns.
 class CommandSet {

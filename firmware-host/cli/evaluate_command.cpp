@@ -1,9 +1,9 @@
 // Poses against a known truth: synthetic specimens, captures of the simulated station, calibrated
 // cameras.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -12,6 +12,7 @@
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/cli/demo_capture.h"
 #include "firmware-host/cli/evaluate_model.h"
+#include "firmware-host/cli/figures.h"
 #include "firmware-host/cli/truth.h"
 #include "reconstruction/evaluate/fig12.h"
 #include "reconstruction/evaluate/pose_trial.h"
@@ -47,10 +48,6 @@ struct EvaluateOptions {
   bool with_joint() const { return method != "paper"; }
   bool with_paper() const { return method != "joint"; }
 };
-
-Json ToJson(const Spread& spread) {
-  return {{"median", spread.median}, {"p95", spread.p95}, {"max", spread.max}};
-}
 
 Json ToJson(const PoseError& error) {
   return {{"centre_mm", error.centre_mm},
@@ -90,10 +87,6 @@ Json ToJson(const MethodFigures& figures, double wrong_px) {
           {"seconds", figures.seconds},
           {"free_directions", free},
           {"per_view", views}};
-}
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // Joint first: what it reports free is taken off for both.
@@ -153,9 +146,13 @@ Result<PoseTrial> TrialOf(const DemoPaths& paths, const EvaluateOptions& options
 // A folder of its own that is removed at the end.
 class ScratchFolder {
  public:
-  ScratchFolder()
-      : path_(fs::temp_directory_path() / fmt::format("scanstation-evaluate-{}", ::getpid())) {
-    fs::create_directories(path_);
+  static Result<std::unique_ptr<ScratchFolder>> Create() {
+    std::error_code code;
+    std::string pattern = (fs::temp_directory_path(code) / "scanstation-XXXXXX").string();
+    if (code || !::mkdtemp(pattern.data()))
+      return Failed("no folder for the capture can be made", pattern,
+                    "set TMPDIR to a folder that can be written, or give --out");
+    return std::unique_ptr<ScratchFolder>(new ScratchFolder(pattern));
   }
   ~ScratchFolder() {
     std::error_code ignored;
@@ -166,6 +163,7 @@ class ScratchFolder {
   const fs::path& path() const { return path_; }
 
  private:
+  explicit ScratchFolder(fs::path path) : path_(std::move(path)) {}
   fs::path path_;
 };
 
@@ -177,7 +175,8 @@ Result<PoseTrial> CapturedTrial(const fs::path& folder, const EvaluateOptions& o
   return TrialOf(paths, options, context);
 }
 
-// The paper renders its photographs from the mesh that it then searches; so does this.
+// The paper renders its photographs from the mesh that it then searches; so does this (but for
+// --paper-faces).
 Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
   SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
   Fig12Options fig12 = options.fig12;
@@ -192,8 +191,8 @@ Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
 Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& context) {
   if (options.is_fig12()) return Fig12Trial(options);
   if (options.out.empty()) {
-    const ScratchFolder scratch;
-    return CapturedTrial(scratch.path(), options, context);
+    SCAN_TRY(const auto scratch, ScratchFolder::Create());
+    return CapturedTrial(scratch->path(), options, context);
   }
   SCAN_TRY(StagedFolder staged, StagedFolder::Create(options.out, options.force));
   SCAN_TRY(PoseTrial trial, CapturedTrial(staged.path(), options, context));
@@ -287,7 +286,7 @@ void AddEvaluate(CommandSet& commands) {
           "photographs: of the 24 captured, evenly spread; fig12: cameras, 100 if not given")
       ->check(CLI::Range(1, 1000));
   command.add_option("--wrong-px", options->wrong_px, "surface error that makes a pose wrong")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   command.add_option("--chains", options->paper.chains, "of the paper's hill climbing")
       ->check(CLI::Range(1, 100))
@@ -299,6 +298,7 @@ void AddEvaluate(CommandSet& commands) {
       .add_option("--paper-faces", options->paper_faces,
                   "the paper's method gets the mesh decimated to this, for its thousands of "
                   "pictures; 0: as it is")
+      ->check(CLI::Range(0, 100'000'000))
       ->capture_default_str();
   command.add_flag("--per-view", options->per_view, "one line a view");
   command.add_option("--out", options->out, "keep session, truth and CT volume in this folder");

@@ -53,6 +53,9 @@ int Report(const scan::Error& error, bool json) {
 int main(int argc, char** argv) {
   CLI::App app("scanstation: natural specimens as 3D models with true shape and true colour");
   app.require_subcommand(1);
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return fmt::format("scanstation: {}; see --help\n", error.what());
+  });
   app.set_version_flag("--version", SCAN_VERSION);
   scan::CommandSet commands(app);
   scan::AddAllCommands(commands);

@@ -32,6 +32,8 @@ struct ModelOptions {
 
 Status Resolve(ModelOptions& options) {
   StageOptions& stages = options.stages;
+  if (options.voxel_mm.size() == 2)
+    return BadInput("a voxel size of two values", "--voxel-mm", "give one value or X,Y,Z");
   if (options.voxel_mm.size() == 1) options.voxel_mm.resize(3, options.voxel_mm.front());
   if (!options.voxel_mm.empty())
     stages.volume.voxel_mm =
@@ -48,7 +50,7 @@ void AddVolumeOptions(CLI::App& command, ModelOptions& options) {
                   "voxel size, one value or X,Y,Z; needed where the file has none")
       ->delimiter(',')
       ->expected(1, 3)
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   command.add_option_function<double>(
       "--threshold",
       [&options](const double& value) {
@@ -57,11 +59,13 @@ void AddVolumeOptions(CLI::App& command, ModelOptions& options) {
       },
       "grey value of the surface; automatic without it");
   command.add_option("--faces", options.stages.surface.decimate.faces, "size of the mesh")
+      ->check(CLI::Range(4, 100'000'000))
       ->capture_default_str();
 }
 
 void AddAtlasOptions(CLI::App& command, ModelOptions& options) {
   command.add_option("--atlas-px", options.stages.atlas.size_px, "side of the atlas")
+      ->check(CLI::Range(64, 16384))
       ->capture_default_str();
   command.add_option("--unfold", options.unfold)
       ->check(CLI::IsMember({"lscm", "arap"}))
@@ -83,6 +87,7 @@ void AddPoseOptions(CLI::App& command, ModelOptions& options) {
   command.add_flag("--no-priors", options.stages.joint.no_priors,
                    "joint: leave logged poses aside, as for photographs taken by hand");
   command.add_option("--chains", options.stages.paper.chains, "of the paper's hill climbing")
+      ->check(CLI::Range(1, 100))
       ->capture_default_str();
 }
 

@@ -99,9 +99,12 @@ void AddImport(CommandSet& commands) {
   command.add_option("--ignore", request.ignore, "folder of ignore pictures, same base names");
   command.add_option("--transforms", request.transforms, "transforms.json");
   command.add_option("--colmap", request.colmap, "folder of COLMAP text files");
-  command.add_option("--sensor-width-mm", request.sensor_width_mm,
-                     "turns an EXIF focal length into pixels");
-  command.add_option("--approx-distance-mm", request.approx_distance_mm, "camera to specimen");
+  command
+      .add_option("--sensor-width-mm", request.sensor_width_mm,
+                  "turns an EXIF focal length into pixels")
+      ->check(Positive());
+  command.add_option("--approx-distance-mm", request.approx_distance_mm, "camera to specimen")
+      ->check(Positive());
   command.add_option("--out", request.out, "session folder to write")->required();
   command.add_flag("--force", request.force, "replace an existing session");
 }

@@ -122,6 +122,25 @@ TEST_F(BadInput, AnExistingOutputIsNotTouched) {
   EXPECT_NE(ReadTextFile(kept).value(), "mine");
 }
 
+TEST_F(BadInput, NumbersOutOfRange) {
+  const std::string slices = Path("slices");
+  fs::create_directory(slices);
+  cv::imwrite(slices + "/0.png", cv::Mat(9, 9, CV_8U, cv::Scalar(7)));
+  cv::imwrite(slices + "/1.png", cv::Mat(9, 9, CV_8U, cv::Scalar(7)));
+  ExpectRefused({"surface", slices, "--voxel-mm", "0.1,0.2", "--out", Path("out")}, "--voxel-mm");
+  const auto refused = [&](const std::vector<std::string>& arguments) {
+    ExpectRefused(arguments, arguments[arguments.size() - 2]);
+  };
+  refused({"surface", slices, "--out", Path("out"), "--faces", "-5"});
+  refused({"surface", slices, "--out", Path("out"), "--faces", "0"});
+  refused({"surface", slices, "--out", Path("out"), "--voxel-mm", "-1"});
+  refused({"surface", slices, "--out", Path("out"), "--voxel-mm", "nan"});
+  refused({"atlas", Path("m.ply"), "--out", Path("out"), "--atlas-px", "0"});
+  refused({"pose", Path("s"), "--mesh", "m.ply", "--out", Path("out"), "--chains", "0"});
+  refused({"import", "--photos", slices, "--out", Path("out"), "--approx-distance-mm", "-1"});
+  refused({"evaluate", "poses", "--paper-faces", "-5"});
+}
+
 TEST_F(BadInput, UnknownCommandsAndOptions) {
   EXPECT_EQ(RunProgram("scanstation", {"fly"}).exit_code, 2);
   EXPECT_EQ(RunProgram("scanstation", {"atlas", "--bend"}).exit_code, 2);
