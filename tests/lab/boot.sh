@@ -15,11 +15,11 @@ cp "$here/guest/main" "$run/main"
 printf 'LAB_DIR=%q\nLAB_BIN=%q\nLAB_SCENE=%q\n' "$here" "$bin" "$(dirname "$(dirname "$run")")/scene" >"$run/environment"
 
 # The guest's processor is emulated, so nothing depends on what the host can virtualise, and its time
-# counts instructions (2 ns each; while it sleeps it jumps to the next timer): what a suite sees does not
+# counts instructions (4 ns each; while it sleeps it jumps to the next timer): what a suite sees does not
 # depend on how busy the host is, and waiting costs nothing. One processor: with more the guest's would
 # run in turns of 100 ms.
 status=0
-timeout "${limit:-180}" qemu-system-x86_64 -M pc -accel tcg -icount shift=1,sleep=off -cpu max -smp 1 -m 1024 \
+timeout "${limit:-180}" qemu-system-x86_64 -M pc -accel tcg -icount shift=2,sleep=off -cpu max -smp 1 -m 1024 \
   -nodefaults -no-user-config -display none -no-reboot -serial "file:$run/console" -monitor none \
   -kernel "$lab/vmlinux" -initrd "$lab/initrd.cpio" \
   -fsdev local,id=r,path=/,security_model=none,readonly=on,multidevs=remap \

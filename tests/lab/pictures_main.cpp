@@ -71,7 +71,7 @@ Status MakePictures(const fs::path& station, const fs::path& out) {
     const Intrinsics& in = state.intrinsics;
     truth.update(
         {{"fx", in.fl_x}, {"fy", in.fl_y}, {"cx", in.cx}, {"cy", in.cy}, {"w", in.w}, {"h", in.h}});
-    truth["views"][fmt::format("{}_{}", view.id, view.camera)] = RowsOf(state.camera_from_model);
+    truth["views"][view.id] = RowsOf(state.camera_from_model);
     for (const bool present : {true, false}) {
       state.specimen_present = present;
       SCAN_TRY(const cv::Mat picture, scene.renderer(state));
@@ -84,7 +84,7 @@ Status MakePictures(const fs::path& station, const fs::path& out) {
   }
   SCAN_CHECK(WriteFileDurably(out / "truth.json", truth.dump(1)));
   SCAN_TRY(const auto specimen, MakeSpecimen(config.sim.specimen));
-  return WritePly(out / "surface.ply", ExactSurface(*specimen, 0.5));
+  return WritePly(out / "surface.ply", ExactSurface(*specimen, 0.3));
 }
 
 }  // namespace

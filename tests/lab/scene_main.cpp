@@ -27,6 +27,8 @@ volatile sig_atomic_t g_present = 1;
 void OnRemoved(int) { g_present = 0; }
 void OnPlaced(int) { g_present = 1; }
 
+constexpr std::int64_t kNearSteps = 5;  // where the switches were seen is not the same to the step
+
 using Place = std::tuple<std::int64_t, std::int64_t, bool>;  // turntable, lift, specimen there
 using Pictures = std::map<Place, std::vector<std::byte>>;
 
@@ -65,14 +67,22 @@ struct Scene {
 
   std::size_t operator()(const GadgetFrame& frame, std::span<std::uint8_t> out) const {
     if (!frame.jpeg || !motors->Sync() || !WriteState(state, *motors)) return 0;
-    const std::int64_t turn = LabTurntable(0).steps_per_turn;
-    const std::int64_t turntable = motors->State("turntable").position;
-    const auto found = pictures.find(
-        {(turntable % turn + turn) % turn, motors->State("lift").position, g_present != 0});
-    const std::vector<std::byte>& jpeg = found != pictures.end() ? found->second : elsewhere;
+    const std::vector<std::byte>& jpeg = Seen();
     const std::size_t size = std::min(jpeg.size(), out.size());
     std::memcpy(out.data(), jpeg.data(), size);
     return size;
+  }
+
+  const std::vector<std::byte>& Seen() const {
+    const std::int64_t turn = LabTurntable(0).steps_per_turn;
+    for (const auto& [place, jpeg] : pictures) {
+      const auto [turntable, lift, present] = place;
+      const std::int64_t off = std::abs(motors->State("turntable").position - turntable) % turn;
+      if (std::min(off, turn - off) <= kNearSteps && present == (g_present != 0) &&
+          std::abs(motors->State("lift").position - lift) <= kNearSteps)
+        return jpeg;
+    }
+    return elsewhere;
   }
 };
 

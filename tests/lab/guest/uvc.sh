@@ -41,7 +41,7 @@ for speed in fs hs ss; do ln -s $function/streaming/header/h $function/streaming
 mkdir $function/control/header/h
 for speed in fs ss; do ln -s $function/control/header/h $function/control/class/$speed/h; done
 echo 3072 >$function/streaming_maxpacket
-echo 1 >$function/streaming_interval
+echo ${UVC_INTERVAL:-1} >$function/streaming_interval # 2^(n-1) eighths of a millisecond a packet
 ln -s $function $UVC_GADGET/configs/c.1/uvc.0
 echo "${UVC_UDC:-dummy_udc.0}" >$UVC_GADGET/UDC
 export UVC_GADGET

@@ -17,7 +17,8 @@ counted() { # POSITION of MOTOR
   sed -n "s/^$1 \(-\?[0-9]*\) .*/\1/p" state
 }
 powered() { awk -v motor="$1" '$1 == motor { print $4 }' state; }
-start() {
+start() { # the socket of one that was killed is still there
+  rm -f "$sock"
   "$LAB_BIN/scanstation-motiond" --config "$config" --socket "$sock" 2>>motiond.log &
   motiond=$!
   until [ -S "$sock" ]; do sleep 0.2; done

@@ -92,7 +92,10 @@ TEST_F(LoopbackPage, ATakenPortIsAnError) {
 
 TEST(Page, EndsAtOnce) {
   for (int i = 0; i < 20; ++i) {
-    ASSERT_TRUE(Page::Start(0, {[] { return nlohmann::json(); }, [] {}, {}}));
+    ASSERT_TRUE(Page::Start(0, {.status = [] { return nlohmann::json(); },
+                                .stop = [] {},
+                                .answer = {},
+                                .last_picture = {}}));
   }
 }
 
