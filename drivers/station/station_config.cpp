@@ -6,6 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "drivers/motion/tic/tic_protocol.h"
+
 namespace scan {
 namespace {
 
@@ -78,10 +80,54 @@ Status ValidateWiring(const AxisConfig& axis, const GpioAxisWiring& wiring) {
   return {};
 }
 
-Status ValidateGpio(const StationConfig& config) {
-  if (config.motion_driver != MotionDriver::gpio) return {};
-  SCAN_CHECK(ValidateWiring(config.turntable, config.gpio.turntable));
-  SCAN_CHECK(ValidateWiring(config.lift, config.gpio.lift));
+Status ValidateTic(const AxisConfig& axis, const TicAxisWiring& wiring) {
+  const auto where = [&](const char* key) { return fmt::format("axis.{}.{}", axis.name, key); };
+  if (wiring.serial.empty() && wiring.port.empty()) {
+    return BadInput("no board", where("tic.serial"),
+                    "name its serial number or its port ('scanstation device tic list')");
+  }
+  if (wiring.microsteps != 0) {
+    if (auto mode = TicStepMode(wiring.microsteps); !mode) {
+      return BadInput(mode.error().what, where("tic.microsteps"), mode.error().mend);
+    }
+  }
+  const double fastest = std::max(axis.velocity, axis.homing.fast) * axis.steps_per_unit;
+  if (fastest > kTicMaxSpeedHz) {
+    return BadInput(fmt::format("{:.0f} microsteps/s are more than a board makes ({:.0f})", fastest,
+                                kTicMaxSpeedHz),
+                    where("velocity"), "lower it, or use fewer microsteps");
+  }
+  if (axis.acceleration * axis.steps_per_unit > kTicMaxAccelHz2) {
+    return BadInput("the acceleration is more than a board takes", where("acceleration"),
+                    "lower it");
+  }
+  if (axis.homing.kind != HomingKind::endstop) {
+    return BadInput("a board homes on a limit switch only", where("homing.kind"),
+                    "choose endstop, and keep min and max within one turn");
+  }
+  if (axis.backlash > 0 && axis.approach == axis.homing.direction) {
+    return BadInput("a board's homing ends away from the switch, against the last approach",
+                    where("approach"), "choose the other sense, or home towards the other end");
+  }
+  if (axis.on_stop == OnStop::brake) {
+    return BadInput("a board works no brake", where("on_stop"), "choose hold or release");
+  }
+  return {};
+}
+
+Status ValidateDriver(const StationConfig& config) {
+  if (config.motion_driver == MotionDriver::sim) return {};
+  if (config.motion_driver == MotionDriver::gpio) {
+    SCAN_CHECK(ValidateWiring(config.turntable, config.gpio.turntable));
+    SCAN_CHECK(ValidateWiring(config.lift, config.gpio.lift));
+  } else {
+    SCAN_CHECK(ValidateTic(config.turntable, config.tic.turntable));
+    SCAN_CHECK(ValidateTic(config.lift, config.tic.lift));
+    if (config.tic.lift.serial == config.tic.turntable.serial &&
+        config.tic.lift.port == config.tic.turntable.port) {
+      return BadInput("both axes name the same board", "axis.lift.tic.serial", "name a board each");
+    }
+  }
   if (config.lift_geometry.kind == "pitch_axis" && config.aims.size() > 1) {
     return BadInput("no driver moves the camera's pitch on this station", "axis.lift.kind",
                     "choose fixed_pitch, arc or manual_aim, or keep one aim");
@@ -198,7 +244,7 @@ Status Validate(const StationConfig& config) {
     return BadInput("the lift would fall when it is released", "axis.lift.on_stop",
                     "choose hold or brake, or set self_locking = true if its drive locks itself");
   }
-  SCAN_CHECK(ValidateGpio(config));
+  SCAN_CHECK(ValidateDriver(config));
   SCAN_CHECK(ValidateIds(config.cameras, "camera"));
   SCAN_CHECK(ValidateIds(config.aims, "aim"));
   const auto& d = config.lift_geometry.direction_in_station;

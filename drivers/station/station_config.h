@@ -13,6 +13,7 @@
 #include "drivers/camera/v4l2/v4l2_config.h"
 #include "drivers/motion/axis_config.h"
 #include "drivers/motion/gpio/gpio_motion_config.h"
+#include "drivers/motion/tic/tic_config.h"
 
 namespace scan {
 
@@ -131,12 +132,13 @@ struct SimConfig {
 };
 
 // What moves the axes.
-enum class MotionDriver { sim, gpio };
+enum class MotionDriver { sim, gpio, tic };
 
 struct StationConfig {
   std::string name = "simulated station";
   MotionDriver motion_driver = MotionDriver::sim;
   GpioMotionConfig gpio;  // of the gpio driver
+  TicMotionConfig tic;    // of the tic driver
   AxisConfig turntable, lift;
   LiftGeometry lift_geometry;
   std::vector<CameraConfig> cameras;

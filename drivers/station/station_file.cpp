@@ -49,10 +49,17 @@ void ReadWiring(TomlReader& in, GpioAxisWiring& wiring) {
   in.Number("enable_ms", wiring.enable_ms, 0, 1000);
 }
 
+void ReadTic(TomlReader& in, TicAxisWiring& wiring) {
+  in.Text("serial", wiring.serial);
+  in.Text("port", wiring.port);
+  in.Integer("microsteps", wiring.microsteps, 0, 256);
+}
+
 void ReadMotion(TomlReader& in, StationConfig& config) {
-  if (const auto word = in.Word("driver", {"sim", "gpio"})) {
+  if (const auto word = in.Word("driver", {"sim", "gpio", "tic"})) {
     config.motion_driver = static_cast<MotionDriver>(*word);
   }
+  in.Number("poll_ms", config.tic.poll_ms, 1, 100);
   in.Text("chip", config.gpio.chip);
   ReadPin(in, "emergency_stop", config.gpio.emergency_stop);
   ReadPin(in, "cover", config.gpio.cover);
@@ -209,10 +216,12 @@ void ReadAxes(TomlReader& in, StationConfig& config) {
   in.Table("turntable", [&](TomlReader& axis) {
     ReadAxis(axis, config.turntable);
     axis.Table("gpio", [&](TomlReader& gpio) { ReadWiring(gpio, config.gpio.turntable); });
+    axis.Table("tic", [&](TomlReader& tic) { ReadTic(tic, config.tic.turntable); });
   });
   in.Table("lift", [&](TomlReader& axis) {
     ReadAxis(axis, config.lift);
     axis.Table("gpio", [&](TomlReader& gpio) { ReadWiring(gpio, config.gpio.lift); });
+    axis.Table("tic", [&](TomlReader& tic) { ReadTic(tic, config.tic.lift); });
     const std::vector<std::string> kinds{"fixed_pitch", "manual_aim", "arc", "pitch_axis"};
     if (const auto word = axis.Word("kind", kinds)) config.lift_geometry.kind = kinds[*word];
     axis.Vector3("direction_in_station", config.lift_geometry.direction_in_station.data(), -1, 1);

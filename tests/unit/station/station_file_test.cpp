@@ -65,6 +65,7 @@ int CountKeysThatAreRead(const std::string& text) {
 TEST(StationFile, EveryKeyIsReadAndEveryOneIsCommented) {
   EXPECT_GT(CountKeysThatAreRead(DefaultFile()), 90);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-uvc.toml")), 18);
+  EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-tic-uvc.toml")), 40);
 }
 
 TEST(StationFile, AUsbCameraHasItsPortFormatAndControls) {
@@ -162,6 +163,41 @@ TEST(StationFile, AWiringMustFitTheAxis) {
   EXPECT_THAT(refusal("index = \"TURNTABLE_INDEX\"", ""), HasSubstr("no line"));
   EXPECT_THAT(refusal("pulse_us = 3.0", "pulse_us = 300.0"), HasSubstr("full velocity"));
   EXPECT_EQ(refusal("core = -1", "core = 1"), "");
+}
+
+TEST(StationFile, ATicStationIsReadWhole) {
+  const auto read = LoadStationConfig(SCAN_SOURCE_DIR "/configs/station-tic-uvc.toml");
+  ASSERT_TRUE(read) << ToString(read.error());
+  EXPECT_EQ(read->motion_driver, MotionDriver::tic);
+  EXPECT_EQ(read->cameras.front().driver, CameraDriver::v4l2);
+  TicMotionConfig expected;
+  expected.turntable = {"00123456", "", 16};
+  expected.lift = {"00123457", "", 16};
+  EXPECT_EQ(read->tic, expected);
+  for (const RingConfig& ring : read->plan.rings) {
+    const double last_deg = ring.start_deg + 360.0 * (ring.count - 1) / ring.count;
+    EXPECT_LE(last_deg, *read->turntable.max) << "the plan stays this side of the switch";
+  }
+}
+
+TEST(StationFile, ATicBoardMustFitItsAxis) {
+  const std::string whole = ConfigFile("station-tic-uvc.toml");
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string text = whole;
+    text.replace(text.find(from), from.size(), to);
+    const auto read = ParseStationConfig(text, "tic.toml");
+    return read ? std::string() : read.error().what;
+  };
+  EXPECT_EQ(refusal("port = \"\"", "port = \"1-2.3\""), "");
+  EXPECT_THAT(refusal("serial = \"00123456\"", "serial = \"\""), HasSubstr("no board"));
+  EXPECT_THAT(refusal("serial = \"00123457\"", "serial = \"00123456\""), HasSubstr("same board"));
+  EXPECT_THAT(refusal("microsteps = 16", "microsteps = 10"), HasSubstr("10 microsteps"));
+  EXPECT_THAT(refusal("velocity = 30.0", "velocity = 3000.0"), HasSubstr("50000"));
+  EXPECT_THAT(refusal("kind = \"endstop\"", "kind = \"index\""), HasSubstr("limit switch only"));
+  EXPECT_THAT(refusal("approach = \"positive\"", "approach = \"negative\""),
+              HasSubstr("last approach"));
+  EXPECT_THAT(refusal("on_stop = \"release\"", "on_stop = \"brake\""), HasSubstr("no brake"));
+  EXPECT_THAT(refusal("poll_ms = 5.0", "poll_ms = 0.0"), HasSubstr("out of range"));
 }
 
 TEST(StationFile, AFileThatIsNotThereIsBadInput) {
