@@ -15,6 +15,9 @@ void AddStationControl(CommandSet& commands);  // confirm status stop pause cont
 // motion_commands.cpp: device motion ..., device gpio ...
 void AddMotionDevices(CommandSet& commands, CLI::App& device);
 
+// usb_commands.cpp: device usb ..., device tic ...
+void AddUsbDevices(CommandSet& commands, CLI::App& device);
+
 // doctor_command.cpp
 void AddDoctor(CommandSet& commands);
 

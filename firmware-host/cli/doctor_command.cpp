@@ -9,7 +9,10 @@
 
 #include "drivers/io/gpio/gpiod_lines.h"
 #include "drivers/motion/real_time.h"
+#include "drivers/motion/tic/tic_protocol.h"
 #include "drivers/station/station_file.h"
+#include "drivers/usb/libusb_bus.h"
+#include "drivers/usb/usb_access.h"
 #include "firmware-host/cli/commands.h"
 
 namespace scan {
@@ -115,6 +118,51 @@ void CheckRealTime(std::vector<Finding>& findings, const RealTimeOptions& option
   }
 }
 
+std::string Text(const UsbIdentity& board) {
+  return fmt::format("{}, firmware {:x}.{:02x}", Describe(board), board.release >> 8,
+                     board.release & 0xff);
+}
+
+// Every board that is there; and, of a station that has them, the boards of its axes.
+void CheckTics(std::vector<Finding>& findings, const StationConfig& config) {
+  const bool needed = config.motion_driver == MotionDriver::tic;
+  const auto add_error = [&](const Error& error) {
+    findings.push_back({needed ? Verdict::bad : Verdict::hint, "USB", ToString(error), error.mend});
+  };
+  const auto bus = MakeLibusbBus();
+  if (!bus) return add_error(bus.error());
+  const auto devices = (*bus)->List();
+  if (!devices) return add_error(devices.error());
+  int boards = 0;
+  for (const UsbIdentity& board : *devices) {
+    if (!FindTicModel(board.vendor, board.product)) continue;
+    ++boards;
+    if (const Status access = CheckUsbAccess(board); !access) {
+      findings.push_back({needed ? Verdict::bad : Verdict::hint, "Tic board",
+                          Text(board) + ": not permitted to this user", access.error().mend});
+    } else if (board.release < kTicLeastFirmware) {
+      findings.push_back({needed ? Verdict::bad : Verdict::hint, "Tic board",
+                          Text(board) + ": too old for limit switches and homing",
+                          "upgrade it to 1.06 or later (Pololu's guide, section 5.7)"});
+    } else {
+      findings.push_back({Verdict::good, "Tic board", Text(board), ""});
+    }
+  }
+  if (!needed) {
+    if (boards == 0) findings.push_back({Verdict::good, "Tic board", "none is connected", ""});
+    return;
+  }
+  for (const auto& [axis, wiring] :
+       {std::pair("turntable", &config.tic.turntable), std::pair("lift", &config.tic.lift)}) {
+    const auto found = FindUsb(*devices, TicSelector(wiring->port, wiring->serial), "Tic board");
+    if (found) {
+      findings.push_back({Verdict::good, axis, "is moved by " + Describe(*found), ""});
+    } else {
+      findings.push_back({Verdict::bad, axis, found.error().what, found.error().mend});
+    }
+  }
+}
+
 Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   std::vector<Finding> findings;
   StationConfig config;
@@ -131,7 +179,8 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   CheckChips(findings, gpio);
   if (gpio) CheckLines(findings, config.gpio);
   CheckRelease(findings);
-  CheckRealTime(findings, config.gpio.real_time);
+  if (config.motion_driver != MotionDriver::tic) CheckRealTime(findings, config.gpio.real_time);
+  CheckTics(findings, config);
 
   CommandOutput output{{{"findings", Json::array()}}, ""};
   bool bad = false;

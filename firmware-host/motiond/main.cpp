@@ -4,29 +4,16 @@
 
 #include <CLI/CLI.hpp>
 
-#include "drivers/base/clock.h"
 #include "drivers/base/files.h"
 #include "drivers/base/log.h"
 #include "drivers/base/sha256.h"
-#include "drivers/io/gpio/gpiod_lines.h"
-#include "drivers/motion/gpio/gpio_motion.h"
-#include "drivers/motion/real_time.h"
-#include "drivers/station/sim_station.h"
 #include "drivers/station/station_file.h"
+#include "firmware-host/devices/open_motion.h"
+#include "firmware-host/devices/open_motion.h"
 #include "firmware-host/protocol/motion_server.h"
 
 namespace scan {
 namespace {
-
-// The one place that names a concrete motion driver.
-Result<std::unique_ptr<Motion>> MakeMotion(const StationConfig& config) {
-  if (config.motion_driver == MotionDriver::gpio) {
-    GpioMotionParts parts{config.turntable, config.lift, config.gpio, {}};
-    for (const AimConfig& aim : config.aims) parts.aim_ids.push_back(aim.id);
-    return MakeGpioMotion(parts, OpenGpiodLines, std::make_shared<RealTimeClock>());
-  }
-  return MakeSimMotion(config, std::make_shared<SimWorld>(config), std::make_shared<SystemClock>());
-}
 
 Status Serve(const std::filesystem::path& config_path, const std::filesystem::path& socket) {
   sigset_t signals;
@@ -37,7 +24,7 @@ Status Serve(const std::filesystem::path& config_path, const std::filesystem::pa
 
   SCAN_TRY(const std::string text, ReadTextFile(config_path));
   SCAN_TRY(const StationConfig config, ParseStationConfig(text, config_path.string()));
-  SCAN_TRY(const std::unique_ptr<Motion> motion, MakeMotion(config));
+  SCAN_TRY(const std::unique_ptr<Motion> motion, OpenMotion(config));
   SCAN_TRY(const auto server,
            ListenForMotion(socket, *motion, {config.name, Sha256Hex(AsBytes(text))}));
   Log(LogLevel::info, "ready", {{"socket", socket.string()}, {"station", config.name}});
