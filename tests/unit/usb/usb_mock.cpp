@@ -11,7 +11,8 @@
 #include <cstring>
 #include <deque>
 #include <map>
-#include <mutex>
+#include <stdexcept>
+#include <vector>
 
 namespace scan {
 namespace {
