@@ -9,7 +9,6 @@
 #include "drivers/base/sha256.h"
 #include "drivers/station/station_file.h"
 #include "firmware-host/devices/open_motion.h"
-#include "firmware-host/devices/open_motion.h"
 #include "firmware-host/protocol/motion_server.h"
 
 namespace scan {

@@ -101,6 +101,12 @@ void TicMotion::CutAll() {
   }
 }
 
+Status TicMotion::LoseHeartbeat() {
+  SetInterlock(Interlock::heartbeat_lost, true);
+  SetInterlock(Interlock::heartbeat_lost, false);  // latched: a person finds it
+  return {};
+}
+
 void TicMotion::SetInterlock(Interlock interlock, bool present) {
   std::stop_source wake;
   {

@@ -44,6 +44,7 @@ class TicMotion final : public Motion {
   Status Abort() override;
   // As StepperMotion: from any thread, also while a move runs.
   void SetInterlock(Interlock interlock, bool present);
+  Status LoseHeartbeat() override;
   Status Acknowledge() override;
   MotionStatus ReadStatus() override;
 
