@@ -1,6 +1,5 @@
 # The V4L2 camera on a UVC camera: contract in YUYV and MJPEG, exposure, throughput, replugging.
 # limit: 600
-# long
 . "$LAB_DIR/guest/uvc.sh"
 "$LAB_BIN/lab_uvc" &
 feeder=$!

@@ -1,7 +1,6 @@
 # The whole station: scanstationd captures 12 views through libgpiod and V4L2, with background plates.
 # host: station
 # limit: 600
-# long
 UVC_INTERVAL=4 # 3 MB/s are enough here, and the guest is busy with every packet
 . "$LAB_DIR/guest/gpio.sh"
 . "$LAB_DIR/guest/uvc.sh"
