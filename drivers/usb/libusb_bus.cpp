@@ -253,14 +253,18 @@ class PollingWatch final : public UsbWatch {
   std::jthread thread_;
 };
 
+// A context hears of devices that come later from udev alone, which containers and small systems
+// may lack: each call looks anew, with a context of its own.
 class LibusbBus final : public UsbBus {
  public:
-  explicit LibusbBus(std::shared_ptr<Context> context) : context_(std::move(context)) {}
-
-  Result<std::vector<UsbIdentity>> List() override { return ListDevices(*context_); }
+  Result<std::vector<UsbIdentity>> List() override {
+    SCAN_TRY(const auto context, Context::Make());
+    return ListDevices(*context);
+  }
 
   Result<std::unique_ptr<UsbDevice>> Open(const UsbIdentity& wanted) override {
-    const DeviceList list(context_->get());
+    SCAN_TRY(const auto context, Context::Make());
+    const DeviceList list(context->get());
     SCAN_CHECK(list.Check());
     for (libusb_device* device : list.devices()) {
       UsbIdentity identity = IdentityOf(device);
@@ -272,7 +276,7 @@ class LibusbBus final : public UsbBus {
       if (const int code = libusb_open(device, &handle); code != 0) {
         return UsbFault(code, "open", identity);
       }
-      auto opened = std::make_unique<LibusbDevice>(context_, handle, identity);
+      auto opened = std::make_unique<LibusbDevice>(context, handle, identity);
       if (const int code = libusb_claim_interface(handle, 0); code != 0) {
         return UsbFault(code, "claim", identity);
       }
@@ -290,16 +294,13 @@ class LibusbBus final : public UsbBus {
     SCAN_CHECK(watch->Start());
     return watch;
   }
-
- private:
-  std::shared_ptr<Context> context_;
 };
 
 }  // namespace
 
 Result<std::unique_ptr<UsbBus>> MakeLibusbBus() {
-  SCAN_TRY(auto context, Context::Make());
-  return std::make_unique<LibusbBus>(std::move(context));
+  SCAN_CHECK(Context::Make());  // so that a missing bus is found at once
+  return std::make_unique<LibusbBus>();
 }
 
 }  // namespace scan

@@ -1,6 +1,6 @@
 # The programs on real lines: scanstation-motiond moves the motors, scanstation device asks it, and what
 # the lines do when it dies, on kernels that release them and on kernels that keep driving them.
-# limit: 400
+# limit: 600
 . "$LAB_DIR/guest/gpio.sh"
 config=$LAB_DIR/../../configs/station-lab.toml
 sock=$PWD/motiond.sock

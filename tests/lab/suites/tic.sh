@@ -1,5 +1,5 @@
 # Motion on two Tic boards through the kernel's USB stack: list, home, move, unplug and plug in again.
-# limit: 400
+# limit: 600
 . "$LAB_DIR/guest/tic.sh"
 until [ "$("$LAB_BIN/scanstation" device tic list | grep -c LAB-)" = 2 ]; do sleep 0.5; done
 "$LAB_BIN/scanstation" device tic list
