@@ -2,7 +2,8 @@
 # usage: boot.sh LAB RUN SUITE BIN   boots the guest of LAB (see build.sh) and runs SUITE there as root.
 # The guest sees this machine's files read-only with changes kept in its memory, and RUN as /out: what
 # the suite prints goes to RUN/log, the kernel's messages to RUN/dmesg and RUN/console. In the suite
-# $LAB_DIR is tests/lab, $LAB_BIN is BIN, $LAB_SCENE is RUN/../../scene (see host/station.sh). A line '# limit: SECONDS' in the suite limits its time
+# $LAB_DIR is tests/lab, $LAB_BIN is BIN, $LAB_SCENE is RUN/../../scene, with a folder for each
+# station (see host/station.sh). A line '# limit: SECONDS' in the suite limits its time
 # (default 180). The exit status is the suite's; 124 when it ran out of time, 125 when the guest died.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)

@@ -1,8 +1,11 @@
-// lab_scene PICTURES STATE TURNTABLE LIFT: the motors of the lab from these positions in steps, and
-// a UVC camera that shows what stands before it: of the pictures that lab_pictures made the one for
+// A UVC camera that shows what stands before it: of the pictures that lab_pictures made the one for
 // where the motors have come to, else one that no capture may keep (a plain magenta). SIGUSR1 takes
-// the specimen off the platter, SIGUSR2 puts it back. Writes to STATE, whole, after every picture
-// sent: "turntable POSITION EDGES POWERED", and the lift's.
+// the specimen off the platter, SIGUSR2 puts it back.
+//   lab_scene PICTURES STATE TURNTABLE LIFT   the motors on GPIO lines, from these positions in
+//   steps;
+//       what they have come to is written to STATE with every picture, whole: "turntable POSITION
+//       EDGES POWERED", and the lift's
+//   lab_scene PICTURES TURNTABLE_PLACE LIFT_PLACE   the motors of two lab_tic boards
 #include <fmt/format.h>
 #include <signal.h>
 
@@ -11,7 +14,9 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
+#include <span>
 #include <tuple>
 
 #include "drivers/base/files.h"
@@ -58,42 +63,70 @@ Status WriteState(const fs::path& path, const MotorModel& model) {
   return {};
 }
 
+// Positions of turntable and lift, in steps from their switches.
+using WhereFn = std::function<Result<std::pair<std::int64_t, std::int64_t>>()>;
+
 // The painter of the gadget: every picture is of where the motors stand when it is asked for.
 struct Scene {
   Pictures pictures;
   std::vector<std::byte> elsewhere;
-  std::shared_ptr<MotorModel> motors;
-  fs::path state;
+  WhereFn where;
 
   std::size_t operator()(const GadgetFrame& frame, std::span<std::uint8_t> out) const {
-    if (!frame.jpeg || !motors->Sync() || !WriteState(state, *motors)) return 0;
-    const std::vector<std::byte>& jpeg = Seen();
+    if (!frame.jpeg) return 0;
+    const auto at = where();
+    if (!at) return 0;
+    const std::vector<std::byte>& jpeg = Seen(at->first, at->second);
     const std::size_t size = std::min(jpeg.size(), out.size());
     std::memcpy(out.data(), jpeg.data(), size);
     return size;
   }
 
-  const std::vector<std::byte>& Seen() const {
-    const std::int64_t turn = LabTurntable(0).steps_per_turn;
+  const std::vector<std::byte>& Seen(std::int64_t turntable, std::int64_t lift) const {
     for (const auto& [place, jpeg] : pictures) {
-      const auto [turntable, lift, present] = place;
-      const std::int64_t off = std::abs(motors->State("turntable").position - turntable) % turn;
-      if (std::min(off, turn - off) <= kNearSteps && present == (g_present != 0) &&
-          std::abs(motors->State("lift").position - lift) <= kNearSteps)
+      const auto [there, high, present] = place;
+      if (std::abs(turntable - there) <= kNearSteps && std::abs(lift - high) <= kNearSteps &&
+          present == (g_present != 0))
         return jpeg;
     }
     return elsewhere;
   }
 };
 
-Status Serve(const fs::path& folder, const fs::path& state, std::int64_t turntable,
-             std::int64_t lift) {
-  Scene scene;
-  SCAN_TRY(scene.pictures, ReadPictures(folder));
-  SCAN_TRY(scene.elsewhere, ReadBinaryFile(folder / "elsewhere.jpg"));
+Result<WhereFn> FollowGpio(const fs::path& state, std::int64_t turntable, std::int64_t lift) {
   SCAN_TRY(const LabBoard board, LabBoardFromEnvironment());
-  SCAN_TRY(scene.motors, MotorModel::Start(board, {LabTurntable(turntable), LabLift(lift)}));
-  scene.state = state;
+  SCAN_TRY(auto started, MotorModel::Start(board, {LabTurntable(turntable), LabLift(lift)}));
+  const std::shared_ptr<MotorModel> motors = std::move(started);
+  return WhereFn([motors, state]() -> Result<std::pair<std::int64_t, std::int64_t>> {
+    SCAN_CHECK(motors->Sync());
+    SCAN_CHECK(WriteState(state, *motors));
+    return std::pair(motors->State("turntable").position, motors->State("lift").position);
+  });
+}
+
+Result<std::int64_t> ReadPlace(const fs::path& file) {
+  std::int64_t place = 0;
+  if (std::ifstream(file) >> place) return place;
+  return Failed("no place of a motor", file.string(), "start lab_tic first");
+}
+
+WhereFn FollowTics(const fs::path& turntable, const fs::path& lift) {
+  return [turntable, lift]() -> Result<std::pair<std::int64_t, std::int64_t>> {
+    SCAN_TRY(const std::int64_t turned, ReadPlace(turntable));
+    SCAN_TRY(const std::int64_t lifted, ReadPlace(lift));
+    return std::pair(turned, lifted);
+  };
+}
+
+Status Serve(std::span<char*> words) {
+  Scene scene;
+  SCAN_TRY(scene.pictures, ReadPictures(words[0]));
+  SCAN_TRY(scene.elsewhere, ReadBinaryFile(fs::path(words[0]) / "elsewhere.jpg"));
+  if (words.size() == 3) {
+    scene.where = FollowTics(words[1], words[2]);
+  } else {
+    SCAN_TRY(scene.where, FollowGpio(words[1], std::atoll(words[2]), std::atoll(words[3])));
+  }
   SCAN_TRY(const auto gadget, UvcGadget::Open(std::move(scene)));
   gadget->Run();
 }
@@ -101,8 +134,8 @@ Status Serve(const fs::path& folder, const fs::path& state, std::int64_t turntab
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) {
-    fmt::print(stderr, "usage: lab_scene PICTURES STATE TURNTABLE LIFT\n");
+  if (argc != 4 && argc != 5) {
+    fmt::print(stderr, "usage: lab_scene PICTURES STATE TURNTABLE LIFT | PICTURES PLACE PLACE\n");
     return 2;
   }
   struct sigaction action {};
@@ -110,7 +143,7 @@ int main(int argc, char** argv) {
   sigaction(SIGUSR1, &action, nullptr);
   action.sa_handler = OnPlaced;
   sigaction(SIGUSR2, &action, nullptr);
-  const Status served = Serve(argv[1], argv[2], std::atoll(argv[3]), std::atoll(argv[4]));
+  const Status served = Serve({argv + 1, static_cast<std::size_t>(argc - 1)});
   fmt::print(stderr, "lab_scene: {}\n", ToString(served.error()));
   return 1;
 }

@@ -1,7 +1,7 @@
 // lab_tic: a Tic board as a USB gadget: a simulated board behind FunctionFS, so that the guest's
 // own USB stack carries every transfer. usage: lab_tic FOLDER START   FOLDER: where FunctionFS is
-// mounted; START: the motor's place in microsteps from the edge of its reverse limit switch. Runs
-// until ended.
+// mounted; START: the motor's place in microsteps from the edge of its reverse limit switch.
+// FOLDER.place always holds its place now. Runs until ended.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/usb/functionfs.h>
@@ -10,6 +10,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <vector>
 
@@ -71,6 +73,11 @@ void Answer(int ep0, scan::SimTic& tic, const usb_ctrlrequest& setup) {
   }
 }
 
+void WritePlace(const std::string& path, std::int64_t place) {
+  std::ofstream(path + ".new") << place << '\n';
+  std::filesystem::rename(path + ".new", path);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -89,6 +96,8 @@ int main(int argc, char** argv) {
   options.reverse_edge = 0;
   options.start = std::atoll(argv[2]);
   scan::SimTic tic(options);
+  const std::string place_file = std::string(argv[1]) + ".place";
+  WritePlace(place_file, tic.place());
   fmt::print("board in {}\n", argv[1]);
   fflush(stdout);
   for (;;) {
@@ -97,5 +106,6 @@ int main(int argc, char** argv) {
     if (got < 0 && errno == EINTR) continue;
     if (got < static_cast<ssize_t>(sizeof(event))) return 1;
     if (event.type == FUNCTIONFS_SETUP) Answer(ep0.get(), tic, event.u.setup);
+    WritePlace(place_file, tic.place());
   }
 }

@@ -1,6 +1,6 @@
 # Sourced by a suite: two Tic boards as USB gadgets on dummy_hcd, serial numbers LAB-T (turntable) and LAB-L
 # (lift). A simulated board answers each through FunctionFS.
-modprobe dummy_hcd is_high_speed=1 num=2
+modprobe dummy_hcd is_high_speed=1 num=3
 modprobe libcomposite
 modprobe usb_f_fs
 add_tic() { # NAME SERIAL UDC START

@@ -1,7 +1,7 @@
 # Sourced by a suite: a UVC camera gadget on dummy_hcd that the guest's own uvcvideo sees; YUYV and MJPEG
 # in three sizes. Its pictures come from whoever feeds the gadget's video node.
 #   $UVC_GADGET  its configfs folder
-modprobe dummy_hcd is_high_speed=1 num=2
+modprobe dummy_hcd is_high_speed=1 num=3
 modprobe uvcvideo
 modprobe libcomposite
 modprobe usb_f_uvc

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# usage: station.sh before|after SCENE BIN RUN   what the host does for a suite of a whole station: the
-# pictures that its camera will show, made once, and the model from the session that it captured.
+# usage: station.sh before|after SCENE BIN RUN STATION   what the host does for a suite of a whole station:
+# the pictures that its camera will show, made once, and the model from the session that it captured.
 set -euo pipefail
-when=$1 scene=$2 bin=$3 run=$4
+when=$1 scene=$2 bin=$3 run=$4 station=$5
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 if [ "$when" = before ]; then
-  [ "$scene/index" -nt "$here/station.toml" ] && [ "$scene/index" -nt "$bin/lab_pictures" ] && exit
-  exec "$bin/lab_pictures" "$here/station.toml" "$scene"
+  [ "$scene/index" -nt "$here/$station.toml" ] && [ "$scene/index" -nt "$bin/lab_pictures" ] && exit
+  exec "$bin/lab_pictures" "$here/$station.toml" "$scene"
 fi
 "$bin/scanstation" reconstruct "$run/session" --mesh "$scene/surface.ply" --out "$run/model" --force >"$run/model.log" 2>&1
 "$bin/scanstation" evaluate "$run/model" --truth "$scene/truth.json" --session "$run/session" \
