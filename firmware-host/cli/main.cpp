@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <signal.h>
 
+#include <exception>
+#include <new>
 #include <thread>
 
 #include "drivers/base/log.h"
@@ -48,6 +50,22 @@ int Report(const scan::Error& error, bool json) {
   return ExitCode(error);
 }
 
+// What a library or the machine throws (no memory, a file system that fails) ends the command like
+// any error of its own.
+scan::Result<scan::CommandOutput> Run(const scan::CommandFn& command,
+                                      const scan::CliContext& context) {
+  try {
+    return command(context);
+  } catch (const std::bad_alloc&) {
+    return scan::Failed("out of memory", "this machine",
+                        "end other programs, or give a smaller volume, fewer or smaller "
+                        "photographs");
+  } catch (const std::exception& e) {
+    return scan::Failed(fmt::format("unexpected: {}", e.what()), "scanstation",
+                        "check the disk and the input, and run again with --verbose");
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -71,7 +89,7 @@ int main(int argc, char** argv) {
                                  .verbose = commands.verbose(),
                                  .progress = scan::MakeTerminalProgress(),
                                  .stop = signals.token()};
-  const auto output = commands.chosen()(context);
+  const auto output = Run(commands.chosen(), context);
   scan::EndTerminalProgress();
   if (!output) return Report(output.error(), context.json);
   if (context.json)
