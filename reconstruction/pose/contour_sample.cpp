@@ -34,11 +34,28 @@ Eigen::Vector2d Smoothed(const Eigen::Vector2d& edge_normal, const Eigen::Vector
 
 struct ProjectedMesh {
   std::vector<Eigen::Vector2d> pixels;  // NaN where not in front of the camera
+  // Which way each face turns in the picture: 1, -1, 0 when it is seen edge-on. Empty unless the
+  // mesh is closed and all of it in front of the camera.
+  std::vector<std::int8_t> turns;
   cv::Mat mask;
 };
 
-ProjectedMesh ProjectMesh(const TriangleMesh& mesh, const CameraFromModel& camera_from_model,
+int SignOf(double v) { return (v > 0) - (v < 0); }
+
+std::vector<std::int8_t> TurnsOf(const std::vector<Face>& faces,
+                                 const std::vector<Eigen::Vector2d>& pixels) {
+  std::vector<std::int8_t> turns;
+  turns.reserve(faces.size());
+  for (const Face& face : faces) {
+    const Eigen::Vector2d &a = pixels[face[0]], ab = pixels[face[1]] - a, ac = pixels[face[2]] - a;
+    turns.push_back(static_cast<std::int8_t>(SignOf(ab.x() * ac.y() - ab.y() * ac.x())));
+  }
+  return turns;
+}
+
+ProjectedMesh ProjectMesh(const ContourMesh& contour_mesh, const CameraFromModel& camera_from_model,
                           const Intrinsics& intrinsics) {
+  const TriangleMesh& mesh = contour_mesh.mesh;
   const Eigen::Vector2d nowhere =
       Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   ProjectedMesh projected;
@@ -47,12 +64,17 @@ ProjectedMesh ProjectMesh(const TriangleMesh& mesh, const CameraFromModel& camer
   rounded.reserve(mesh.vertices.size());
   const Eigen::Matrix3d rotation = camera_from_model.rotation();
   const Eigen::Vector3d translation = camera_from_model.translation();
+  bool all_in_front = true;
   for (const Eigen::Vector3d& v : mesh.vertices) {
-    projected.pixels.push_back(Project(intrinsics, rotation * v + translation).value_or(nowhere));
+    const auto pixel = Project(intrinsics, rotation * v + translation);
+    all_in_front &= pixel.has_value();
+    projected.pixels.push_back(pixel.value_or(nowhere));
     rounded.push_back(projected.pixels.back().cast<float>());
   }
   projected.mask = cv::Mat(intrinsics.h, intrinsics.w, CV_8U, cv::Scalar(0));
-  FillTriangles(rounded, mesh.faces, projected.mask);
+  const bool solid = all_in_front && contour_mesh.closed;
+  if (solid) projected.turns = TurnsOf(mesh.faces, projected.pixels);
+  FillTriangles(rounded, mesh.faces, projected.mask, {.one_side = solid});
   return projected;
 }
 
@@ -76,11 +98,38 @@ Eigen::Vector2d FoldNormal(const ContourMesh& mesh, const MeshEdge& edge,
   return first_side > 0 ? Eigen::Vector2d(-normal) : normal;
 }
 
+// Two faces that run through their edge in opposite directions and turn alike in the picture lie
+// on either side of it. A quick way past most edges.
+bool LiesFlat(const ContourMesh& mesh, const MeshEdge& edge,
+              const std::vector<std::int8_t>& turns) {
+  if (turns.empty() || edge.face_count != 2) return false;
+  const std::uint32_t* faces = &mesh.edges.faces[edge.first_face];
+  return turns[faces[0]] * turns[faces[1]] > 0;
+}
+
+int RunsThrough(const Face& face, const std::array<std::uint32_t, 2>& edge) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (face[k] == edge[0] && face[(k + 1) % 3] == edge[1]) return 1;
+  }
+  return -1;
+}
+
+bool IsClosed(const TriangleMesh& mesh, const MeshEdges& edges) {
+  for (const MeshEdge& edge : edges.edges) {
+    int sum = 0;
+    for (std::uint32_t k = 0; k < edge.face_count; ++k)
+      sum += RunsThrough(mesh.faces[edges.faces[edge.first_face + k]], edge.vertices);
+    if (sum != 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 ContourMesh::ContourMesh(const TriangleMesh& triangle_mesh)
     : mesh(triangle_mesh),
       edges(BuildMeshEdges(triangle_mesh)),
+      closed(IsClosed(triangle_mesh, edges)),
       vertex_normals(VertexNormals(triangle_mesh)),
       centre(MassCentre(triangle_mesh)) {
   for (const auto& v : mesh.vertices) radius_mm = std::max(radius_mm, (v - centre).norm());
@@ -93,22 +142,23 @@ std::vector<ContourSample> FindContourSamples(const ContourMesh& contour_mesh,
                                               const CameraFromModel& camera_from_model,
                                               const Intrinsics& intrinsics, double spacing_px) {
   const TriangleMesh& mesh = contour_mesh.mesh;
-  const ProjectedMesh projected = ProjectMesh(mesh, camera_from_model, intrinsics);
+  const ProjectedMesh projected = ProjectMesh(contour_mesh, camera_from_model, intrinsics);
   const Eigen::Matrix3d rotation = camera_from_model.rotation();
   std::vector<ContourSample> samples;
   double skipped_px = 0;
   for (const MeshEdge& edge : contour_mesh.edges.edges) {
+    if (LiesFlat(contour_mesh, edge, projected.turns)) continue;
     const Eigen::Vector2d edge_normal = FoldNormal(contour_mesh, edge, projected.pixels);
     if (edge_normal.isZero()) continue;
     const auto [ia, ib] = edge.vertices;
     const Eigen::Vector2d &a = projected.pixels[ia], &b = projected.pixels[ib];
-    const Eigen::Vector2d middle = 0.5 * (a + b);
-    const bool inside = middle.x() >= 0 && middle.y() >= 0 && middle.x() < intrinsics.w &&
-                        middle.y() < intrinsics.h;
-    if (!inside || Covered(projected.mask, middle + kProbePx * edge_normal)) continue;
+    const auto at_background = [&](const Eigen::Vector2d& p) {
+      return p.x() >= 0 && p.y() >= 0 && p.x() < intrinsics.w && p.y() < intrinsics.h &&
+             !Covered(projected.mask, p + kProbePx * edge_normal);
+    };
     const double length = (b - a).norm();
     if (length + skipped_px < 0.5 * spacing_px) {
-      skipped_px += length;
+      if (at_background(0.5 * (a + b))) skipped_px += length;
       continue;
     }
     const Eigen::Vector2d normal = Smoothed(
@@ -116,13 +166,14 @@ std::vector<ContourSample> FindContourSamples(const ContourMesh& contour_mesh,
     const int pieces = std::max(1, static_cast<int>(std::lround(length / spacing_px)));
     for (int k = 0; k < pieces; ++k) {
       const double t = (k + 0.5) / pieces;
+      if (!at_background((1 - t) * a + t * b)) continue;
       const Eigen::Vector3d point = (1 - t) * mesh.vertices[ia] + t * mesh.vertices[ib];
       const auto pixel = Project(intrinsics, camera_from_model * point);
       if (!pixel) continue;
       samples.push_back({point, *pixel, normal, 0.5 / pieces * (b - a),
-                         length / pieces + (k == 0 ? skipped_px : 0), edge.vertices});
+                         length / pieces + skipped_px, edge.vertices});
+      skipped_px = 0;
     }
-    skipped_px = 0;
   }
   return samples;
 }

@@ -20,6 +20,9 @@ struct ContourMesh {
 
   const TriangleMesh& mesh;  // outlives this
   MeshEdges edges;
+  // Faces run through every edge as often one way as the other: every line of sight enters as
+  // often as it leaves. Stays so when vertices are merged.
+  bool closed = false;
   std::vector<Eigen::Vector3d> vertex_normals;  // smooth; zero where undefined
   Eigen::Vector3d centre;                       // mass centre, model frame
   double radius_mm = 0;                         // largest distance of a vertex from it

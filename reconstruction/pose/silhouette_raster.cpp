@@ -72,22 +72,30 @@ bool CoveredAlready(const cv::Mat& mask, int x0, int x1, int y0, int y1) {
   return true;
 }
 
+bool RunsClockwise(const Eigen::Vector2f& a, const Eigen::Vector2f& b, const Eigen::Vector2f& c) {
+  const float abx = b.x() - a.x(), aby = b.y() - a.y();
+  const float acx = c.x() - a.x(), acy = c.y() - a.y();
+  return abx * acy - aby * acx > 0;  // rows run down
+}
+
 }  // namespace
 
 void FillTriangles(std::span<const Eigen::Vector2f> pixels, std::span<const Face> faces,
-                   cv::Mat& mask, bool closed_edges) {
+                   cv::Mat& mask, const FillOptions& options) {
   const std::vector<FirstPixel> first = FirstPixels(pixels);
   for (const Face& face : faces) {
     const FirstPixel &a = first[face[0]], &b = first[face[1]], &c = first[face[2]];
     // One branch: which of the conditions holds cannot be predicted.
     const bool rows = ((a.y ^ b.y) | (a.y ^ c.y)) != 0, columns = ((a.x ^ b.x) | (a.x ^ c.x)) != 0;
-    if (!(rows & columns & a.drawn & b.drawn & c.drawn)) continue;
+    const bool facing =
+        !options.one_side | RunsClockwise(pixels[face[0]], pixels[face[1]], pixels[face[2]]);
+    if (!(facing & rows & columns & a.drawn & b.drawn & c.drawn)) continue;
     const auto [x0, x1] = std::minmax({a.x, b.x, c.x});
     const auto [y0, y1] = std::minmax({a.y, b.y, c.y});
     if (CoveredAlready(mask, x0, x1, y0, y1)) continue;
     FillTriangle(pixels[face[0]], pixels[face[1]], pixels[face[2]], mask);
   }
-  if (!closed_edges) return;
+  if (!options.vertices_too) return;
   for (const Eigen::Vector2f& p : pixels) {
     if (!(p.x() >= 0 && p.y() >= 0 && p.x() < static_cast<float>(mask.cols) &&
           p.y() < static_cast<float>(mask.rows)))

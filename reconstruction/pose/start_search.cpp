@@ -130,8 +130,9 @@ Match MatchOf(const Eigen::Matrix3d& centred_from_model, const std::vector<Templ
               const DirectionIndex& index, int angles) {
   Match m;
   m.direction = static_cast<std::size_t>(index.Nearest(-centred_from_model.row(2).transpose()));
-  const Eigen::Matrix3d turn =
-      centred_from_model * templates[m.direction].camera_from_model.transpose();
+  // turn = centred_from_model * camera_from_model': only what its angle about z depends on.
+  const Eigen::Matrix3d& shown = templates[m.direction].camera_from_model;
+  const auto turn = [&](int i, int k) { return centred_from_model.row(i).dot(shown.row(k)); };
   m.angle_rad = std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
   const int a = static_cast<int>(std::lround(m.angle_rad / (2 * kPi) * angles));
   m.angle = static_cast<std::size_t>((a % angles + angles) % angles);
@@ -223,7 +224,7 @@ TriangleMesh ClusteredMesh(const TriangleMesh& mesh, double cell_mm) {
 }
 
 TriangleMesh MeshForRoughSteps(const ContourMesh& mesh) {
-  TriangleMesh coarse = ClusteredMesh(mesh.mesh, mesh.radius_mm / 50);
+  TriangleMesh coarse = ClusteredMesh(mesh.mesh, mesh.radius_mm / 30);
   const bool coarser =
       coarse.faces.size() > 1000 && 2 * coarse.faces.size() < mesh.mesh.faces.size();
   return coarser ? coarse : mesh.mesh;
@@ -248,8 +249,8 @@ std::vector<StartCandidate> SearchStarts(const ContourMesh& mesh, const RigModel
   std::vector<Template> templates(directions.size());
   tbb::parallel_for(std::size_t{0}, directions.size(), [&](std::size_t k) {
     if (stop.stop_requested()) return;
-    templates[k] = RenderTemplate(coarse, mesh.centre, mesh.radius_mm, directions[k], distance_mm,
-                                  options.points);
+    templates[k] = RenderTemplate(coarse, mesh.closed, mesh.centre, mesh.radius_mm, directions[k],
+                                  distance_mm, options.points);
   });
   if (stop.stop_requested()) return {};
   ScoreTables tables = ScoreAll(templates, views, distance_mm, options);

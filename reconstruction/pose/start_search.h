@@ -45,7 +45,7 @@ std::vector<StartCandidate> SearchStarts(const ContourMesh& mesh, const RigModel
 // The mesh with the vertices of each cell of a grid merged: for small pictures.
 TriangleMesh ClusteredMesh(const TriangleMesh& mesh, double cell_mm);
 
-// The mesh clustered to a hundredth of its size, for refining many candidates; the mesh itself
+// The mesh clustered to a sixtieth of its size, for refining many candidates; the mesh itself
 // where that saves less than half of the faces.
 TriangleMesh MeshForRoughSteps(const ContourMesh& mesh);
 

@@ -30,7 +30,6 @@ Silhouette MakeSilhouette(const std::vector<Eigen::Vector2f>& contour, double ro
   float reach = 0.1f;
   for (const auto& p : contour) reach = std::max({reach, std::abs(p.x()), std::abs(p.y())});
   reach += static_cast<float>(kClip);
-  constexpr int kFieldSide = 112;
   s.field.scale = 0.5f * kFieldSide / reach;
   cv::Mat seeds(kFieldSide, kFieldSide, CV_8U, cv::Scalar(255));
   for (const auto& p : contour) {
@@ -46,8 +45,9 @@ Silhouette MakeSilhouette(const std::vector<Eigen::Vector2f>& contour, double ro
   return s;
 }
 
-Template RenderTemplate(const TriangleMesh& mesh, const Eigen::Vector3d& centre, double radius_mm,
-                        const Eigen::Vector3d& direction, double distance_mm, int count) {
+Template RenderTemplate(const TriangleMesh& mesh, bool closed, const Eigen::Vector3d& centre,
+                        double radius_mm, const Eigen::Vector3d& direction, double distance_mm,
+                        int count) {
   Template t;
   const Eigen::Vector3d z = -direction;
   const Eigen::Vector3d x = z.unitOrthogonal();
@@ -65,7 +65,8 @@ Template RenderTemplate(const TriangleMesh& mesh, const Eigen::Vector3d& centre,
                         static_cast<float>(0.5 * kSide + scale * c.y()));
   }
   cv::Mat mask(kSide, kSide, CV_8U, cv::Scalar(0));
-  FillTriangles(pixels, mesh.faces, mask, true);
+  FillTriangles(pixels, mesh.faces, mask,
+                {.vertices_too = true, .one_side = closed && distance_mm > radius_mm});
   const cv::Moments moments = cv::moments(mask, true);
   if (moments.m00 < 1) return t;
   const Eigen::Vector2d centroid(moments.m10 / moments.m00 + 0.5, moments.m01 / moments.m00 + 0.5);
@@ -102,9 +103,19 @@ std::vector<Eigen::Vector2f> Rotated(const std::vector<Eigen::Vector2f>& points,
 }
 
 float MeanDistance(const DistanceField& field, const std::vector<Eigen::Vector2f>& points) {
-  float sum = 0;
-  for (const auto& p : points) sum += field.At(p);
-  return sum / static_cast<float>(points.size());
+  const uchar* steps = field.steps.data;
+  const auto side = static_cast<float>(kFieldSide);
+  const float middle = 0.5f * side;
+  int sum = 0, outside = 0;
+  for (const auto& p : points) {
+    const float x = p.x() * field.scale + middle, y = p.y() * field.scale + middle;
+    if (x >= 0 && y >= 0 && x < side && y < side)
+      sum += steps[static_cast<int>(y) * kFieldSide + static_cast<int>(x)];
+    else
+      ++outside;
+  }
+  return (kStep * static_cast<float>(sum) + field.clip * static_cast<float>(outside)) /
+         static_cast<float>(points.size());
 }
 
 }  // namespace scan::start

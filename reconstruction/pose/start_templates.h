@@ -14,20 +14,14 @@ namespace scan::start {
 
 constexpr int kSide = 72;            // px of a template
 constexpr double kClip = 0.25;       // of a contour distance, in roots of the area
+constexpr int kFieldSide = 112;      // px
 constexpr float kStep = 1.0f / 512;  // of stored distances, in roots of the area
 
 // Contour distances around a silhouette's centroid in units of the root of its area.
 struct DistanceField {
-  cv::Mat steps;    // CV_8U, in kStep, clipped
+  cv::Mat steps;    // CV_8U, kFieldSide squared, continuous; in kStep, clipped
   float scale = 1;  // px per unit
-  float clip = static_cast<float>(kClip);
-  // Outside of the field everything is far.
-  float At(const Eigen::Vector2f& p) const {
-    const int x = static_cast<int>(p.x() * scale + 0.5f * static_cast<float>(steps.cols));
-    const int y = static_cast<int>(p.y() * scale + 0.5f * static_cast<float>(steps.rows));
-    if (x < 0 || y < 0 || x >= steps.cols || y >= steps.rows) return clip;
-    return kStep * static_cast<float>(steps.ptr<uchar>(y)[x]);
-  }
+  float clip = static_cast<float>(kClip);  // outside of the field
 };
 
 struct Silhouette {
@@ -46,9 +40,11 @@ struct Template {
 // `contour`: about the centroid, in roots of the area; `count` points of it are kept.
 Silhouette MakeSilhouette(const std::vector<Eigen::Vector2f>& contour, double root_area, int count);
 
-// The mesh seen from `direction` (unit length, model frame) at `distance_mm` from its mass centre.
-Template RenderTemplate(const TriangleMesh& mesh, const Eigen::Vector3d& centre, double radius_mm,
-                        const Eigen::Vector3d& direction, double distance_mm, int count);
+// The mesh seen from `direction` (unit length, model frame) at `distance_mm` from its mass centre;
+// `closed` as in ContourMesh.
+Template RenderTemplate(const TriangleMesh& mesh, bool closed, const Eigen::Vector3d& centre,
+                        double radius_mm, const Eigen::Vector3d& direction, double distance_mm,
+                        int count);
 
 // A photograph's silhouette seen by the camera turned to its centroid; `turn` receives
 // centred_from_camera.

@@ -90,8 +90,8 @@ ViewSearch::ViewSearch(const ContourMesh& mesh, double distance_mm, const StartO
   const TriangleMesh small = ClusteredMesh(mesh.mesh, 2 * mesh.radius_mm / kSide);
   templates_.resize(directions.size());
   tbb::parallel_for(std::size_t{0}, directions.size(), [&](std::size_t k) {
-    templates_[k] = RenderTemplate(small, mesh.centre, mesh.radius_mm, directions[k], distance_mm_,
-                                   search.points);
+    templates_[k] = RenderTemplate(small, mesh.closed, mesh.centre, mesh.radius_mm, directions[k],
+                                   distance_mm_, search.points);
   });
 }
 

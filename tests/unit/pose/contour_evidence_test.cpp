@@ -74,5 +74,28 @@ TEST(MatchContour, TheFarSideOfAThinLegIsNoPartner) {
   EXPECT_NEAR(match.matches[0].residual_px, 3, 0.51);
 }
 
+// Half of the faces are enough for a closed mesh: nothing else may follow from it.
+TEST(FindContourSamples, AClosedMeshIsSeenAsAnyOther) {
+  const TriangleMesh mesh = test::BugMesh(2);
+  ContourMesh contour_mesh(mesh);
+  EXPECT_TRUE(contour_mesh.closed);
+  const ViewState state = test::BugView();
+  const auto quick = FindContourSamples(contour_mesh, state.camera_from_model, state.intrinsics, 2);
+  contour_mesh.closed = false;
+  const auto plain = FindContourSamples(contour_mesh, state.camera_from_model, state.intrinsics, 2);
+  ASSERT_EQ(quick.size(), plain.size());
+  ASSERT_GT(quick.size(), 100u);
+  for (std::size_t i = 0; i < quick.size(); ++i) EXPECT_EQ(quick[i].pixel, plain[i].pixel);
+}
+
+TEST(ContourMesh, KnowsWhetherItIsClosed) {
+  TriangleMesh mesh = test::BugMesh(0);
+  EXPECT_TRUE(ContourMesh(mesh).closed);
+  std::swap(mesh.faces[3][0], mesh.faces[3][1]);
+  EXPECT_FALSE(ContourMesh(mesh).closed);
+  mesh.faces.erase(mesh.faces.begin() + 3);
+  EXPECT_FALSE(ContourMesh(mesh).closed);
+}
+
 }  // namespace
 }  // namespace scan

@@ -47,9 +47,8 @@ TEST(Paper, CostOfTheTruePoseIsNothing) {
 }
 
 // Eq 4 as it is written, nothing given up on the way.
-double PlainCost(const PaperTemplate& t, const ReducedPicture& picture, double angle) {
-  const cv::Moments m = cv::moments(picture.mask, true);
-  const Eigen::Vector2d target(m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5);
+double PlainCost(const PaperTemplate& t, const ReducedPicture& picture,
+                 const Eigen::Vector2d& target, double angle) {
   double sum = 0;
   int count = 0;
   for (const Eigen::Vector2f& p : t.boundary) {
@@ -69,10 +68,12 @@ TEST(SearchTemplates, FindsTheLeastOfEq4AsAPlainSearchDoes) {
   const ReducedPicture picture = ReducePicture(test::RenderMask(mesh, pose, kReduced), kReduced);
   const auto templates =
       RenderTemplates(mesh, centre, IcosphereDirections(1), {540, 560}, kReduced);
+  const cv::Moments m = cv::moments(picture.mask, true);
+  const Eigen::Vector2d target(m.m10 / m.m00 + 0.5, m.m01 / m.m00 + 0.5);
   double least = 1e9;
   for (const PaperTemplate& t : templates)
     for (int angle = 0; angle < 360; angle += 5)
-      least = std::min(least, PlainCost(t, picture, RadFromDeg(angle)));
+      least = std::min(least, PlainCost(t, picture, target, RadFromDeg(angle)));
   EXPECT_NEAR(SearchTemplates(templates, picture, 5).cost_px, least, 0.02);
 }
 
