@@ -22,16 +22,28 @@ ContourGrid ModelGrid(const ContourMesh& mesh, const ViewState& state) {
   return ContourGrid(std::move(pieces), state.intrinsics.w, state.intrinsics.h);
 }
 
+// Where the specimen, or the gap beside it, is thinner than a pixel, the interpolated coverage need
+// not pass one half: the photograph shows no outline there, or a shifted one. From one pixel on it
+// does, where it should: pixels average over their square, interpolation spans two of them.
+bool CanBeSeen(const ContourSample& sample, const ContourGrid& model, double mask_bias_px) {
+  constexpr double kThinnestPx = 1.0;
+  const Eigen::Vector2d at = sample.pixel + mask_bias_px * sample.normal;
+  return !model.Nearest(at, -sample.normal, kThinnestPx, 0.5);
+}
+
 }  // namespace
 
 Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
                           const ViewState& state, double tolerance_px, double spacing_px) {
   Explained explained;
-  const auto samples =
-      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, spacing_px);
+  auto samples = FindContourSamples(mesh, state.camera_from_model, state.intrinsics, spacing_px);
   explained.sees_anything = !samples.empty();
   if (samples.empty() || photo.empty()) return explained;
 
+  const ContourGrid grid = ModelGrid(mesh, state);
+  std::erase_if(samples, [&](const ContourSample& sample) {
+    return !CanBeSeen(sample, grid, state.mask_bias_px);
+  });
   const MatchResult match = MatchContour(samples, photo, state.mask_bias_px, 3 * tolerance_px);
   double near_px = 0, squares = 0;
   for (const ContourMatch& m : match.matches) {
@@ -43,7 +55,6 @@ Explained ExplainedShares(const ContourMesh& mesh, const PhotoContour& photo,
   explained.model_share = model_px > 0 ? near_px / model_px : 0;
   explained.rms_px = near_px > 0 ? std::sqrt(squares / near_px) : 0;
 
-  const ContourGrid grid = ModelGrid(mesh, state);
   std::size_t found = 0;
   for (const ContourPoint& p : photo.points)
     found += grid.Nearest(p.position, p.normal, tolerance_px, 0.5).has_value();

@@ -16,7 +16,7 @@ struct AcceptanceOptions {
 
 struct Explained {
   double photo_share = 0;      // of the photo's contour, flagged pieces left out
-  double model_share = 0;      // of the model's visible contour
+  double model_share = 0;      // of the model's visible contour, what is thinner than 1 px left out
   double rms_px = 0;           // of the residuals that count as explained
   bool sees_anything = false;  // a part of the model's contour is in the picture
 };

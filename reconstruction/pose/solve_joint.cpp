@@ -79,10 +79,13 @@ std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
                              std::span<const PhotoContour> photos, const RefineResult& fit,
                              const std::vector<bool>& use, const JointOptions& options,
                              double scale, double spacing_px) {
+  // A contour of coverage is rounded at the specimen's corners by about this, however small the
+  // photograph.
+  constexpr double kCornerPx = 0.25;
   const RigPosterior posterior = PosteriorOf(rig, fit);
   const double tolerance_px =
       options.acceptance.sigmas *
-      std::max(PooledSigma(fit.fits, use), scale * options.acceptance.sigma_floor_px);
+      std::max({PooledSigma(fit.fits, use), scale * options.acceptance.sigma_floor_px, kCornerPx});
   std::vector<Judgement> judgements(photos.size());
   tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
     const int view = static_cast<int>(i);
