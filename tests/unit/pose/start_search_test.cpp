@@ -70,7 +70,7 @@ TEST(SearchStarts, FindsAnyPlacing) {
 }
 
 TEST(SolveJoint, UnknownPlacingAndStaticRigErrors) {
-  const TriangleMesh mesh = test::BugMesh(3);
+  const TriangleMesh mesh = test::BugMesh(2);
   test::SceneOptions options;
   options.w = 924;
   options.h = 612;
@@ -92,7 +92,7 @@ TEST(SolveJoint, UnknownPlacingAndStaticRigErrors) {
 }
 
 TEST(SolveJoint, AMirroredMeshIsRejected) {
-  const TriangleMesh mesh = test::BugMesh(3);
+  const TriangleMesh mesh = test::BugMesh(2);
   test::SceneOptions options;
   options.w = 924;
   options.h = 612;
