@@ -6,6 +6,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "drivers/motion/axis_target.h"
+
 namespace scan {
 namespace {
 
@@ -47,21 +49,7 @@ void Axis::Advance(AxisEvent event) {
 }
 
 Status Axis::CheckTarget(double target) const {
-  if (!std::isfinite(target)) {
-    return BadInput("target is not a number", config_.name, "give a finite position");
-  }
-  if ((config_.min && target < *config_.min) || (config_.max && target > *config_.max)) {
-    return BadInput(fmt::format("target {} {} is outside the limits {} to {} {}", target,
-                                config_.unit, config_.min ? fmt::to_string(*config_.min) : "-inf",
-                                config_.max ? fmt::to_string(*config_.max) : "inf", config_.unit),
-                    config_.name, "choose a position within them");
-  }
-  if (!Accepts(state_, AxisCommand::move)) {
-    return DeviceFault(
-        fmt::format("axis is {}{}{}", Row(state_).name, fault_.empty() ? "" : ": ", fault_),
-        config_.name, std::string(Row(state_).mend));
-  }
-  return {};
+  return CheckAxisTarget(config_, state_, fault_, target);
 }
 
 Status Axis::BeginHoming() {

@@ -27,18 +27,10 @@ BoundingCylinder CylinderAround(const BoundingBox& bounds, const TableFromModel&
   return cylinder;
 }
 
-Json RowsOf(const CameraFromModel& camera_from_model) {
-  const auto matrix = camera_from_model.matrix34();
-  Json rows = Json::array();
-  for (int r = 0; r < 3; ++r)
-    rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
-  return rows;
-}
-
 Json TruthLine(const FrameTruth& frame) {
   return {{"camera", frame.camera_id},
           {"sensor_sequence", frame.sensor_sequence},
-          {"camera_from_model", RowsOf(frame.state.camera_from_model)},
+          {"camera_from_model", JsonRows(frame.state.camera_from_model.matrix34())},
           {"intrinsics", Json(ToJson(frame.state.intrinsics))}};
 }
 

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "acquisition/plan/station_plan.h"
+#include "acquisition/session/json_fields.h"
 #include "drivers/base/files.h"
 #include "drivers/base/units.h"
 #include "drivers/camera/encode_picture.h"
@@ -43,14 +44,6 @@ TrueState StateOf(const StationConfig& config, const SimWorld& world, const Plan
   return state;
 }
 
-Json RowsOf(const CameraFromModel& camera_from_model) {
-  const auto matrix = camera_from_model.matrix34();
-  Json rows = Json::array();
-  for (int r = 0; r < 3; ++r)
-    rows.push_back({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)});
-  return rows;
-}
-
 Status MakePictures(const fs::path& station, const fs::path& out) {
   SCAN_TRY(StationConfig config, LoadStationConfig(station));
   SCAN_TRY(const SimScene scene, MakeSimScene(config.sim.specimen));
@@ -71,7 +64,7 @@ Status MakePictures(const fs::path& station, const fs::path& out) {
     const Intrinsics& in = state.intrinsics;
     truth.update(
         {{"fx", in.fl_x}, {"fy", in.fl_y}, {"cx", in.cx}, {"cy", in.cy}, {"w", in.w}, {"h", in.h}});
-    truth["views"][view.id] = RowsOf(state.camera_from_model);
+    truth["views"][view.id] = JsonRows(state.camera_from_model.matrix34());
     for (const bool present : {true, false}) {
       state.specimen_present = present;
       SCAN_TRY(const cv::Mat picture, scene.renderer(state));

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "drivers/base/log.h"
+#include "drivers/motion/axis_target.h"
 
 namespace scan {
 namespace {
@@ -129,24 +130,12 @@ Status TicAxis::SendLimits() {
 }
 
 Status TicAxis::CheckTarget(double target) const {
-  if (!std::isfinite(target)) {
-    return BadInput("target is not a number", config_.name, "give a finite position");
-  }
   // The board counts in 32 bits; the overshoot of a last approach fits into the margin.
   const double reach = 2e9 / config_.steps_per_unit;
-  const double low = config_.min.value_or(config_.homing.position - reach);
-  const double high = config_.max.value_or(config_.homing.position + reach);
-  if (target < low || target > high) {
-    return BadInput(fmt::format("target {} {} is outside the limits {} to {} {}", target,
-                                config_.unit, low, high, config_.unit),
-                    config_.name, "choose a position within them");
-  }
-  if (!Accepts(state_, AxisCommand::move)) {
-    return DeviceFault(
-        fmt::format("axis is {}{}{}", Row(state_).name, fault_.empty() ? "" : ": ", fault_),
-        config_.name, std::string(Row(state_).mend));
-  }
-  return {};
+  AxisConfig within = config_;
+  within.min = config_.min.value_or(config_.homing.position - reach);
+  within.max = config_.max.value_or(config_.homing.position + reach);
+  return CheckAxisTarget(within, state_, fault_, target);
 }
 
 Status TicAxis::BeginMove(double target, std::int64_t now_ns) {
