@@ -185,9 +185,12 @@ void TicMotion::Begin() {
   wake_ = std::stop_source();
 }
 
-void TicMotion::End() {
-  std::lock_guard lock(mutex_);
+// What came while the motion was ending is not lost.
+Status TicMotion::EndLocked() {
   running_ = false;
+  if (cut_requested_) return tl::unexpected(EndError(Outcome::power_cut));
+  if (abort_requested_) return tl::unexpected(EndError(Outcome::aborted));
+  return {};
 }
 
 // Of a motion that did not finish. Precondition: not finished.
@@ -273,10 +276,11 @@ Result<HomeReport> TicMotion::Home(std::stop_token stop) {
     const std::stop_callback on_stop(stop, [this] { (void)Stop(); });
     homed = Homing();
   }
-  End();
+  std::lock_guard lock(mutex_);
+  const Status ended = EndLocked();
+  if (homed) homed = ended;
   LogEnd("home", homed ? nullptr : &homed.error());
   if (!homed) return tl::unexpected(homed.error());
-  std::lock_guard lock(mutex_);
   interlocks_.Homed();
   return HomeReport{++reference_epoch_, Position()};
 }
@@ -317,7 +321,10 @@ Result<MoveReport> TicMotion::MoveTo(const StageTarget& target, std::stop_token 
   }
   const std::stop_callback on_stop(stop, [this] { (void)Stop(); });
   auto moved = Moving(target);
-  End();
+  {
+    std::lock_guard lock(mutex_);
+    if (const Status ended = EndLocked(); moved && !ended) moved = tl::unexpected(ended.error());
+  }
   LogEnd("move", moved ? nullptr : &moved.error());
   return moved;
 }

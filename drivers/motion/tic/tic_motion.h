@@ -59,7 +59,7 @@ class TicMotion final : public Motion {
 
   TicMotion(const TicMotionParts& parts, std::shared_ptr<UsbBus> bus, std::shared_ptr<Clock> clock);
   void Begin();
-  void End();
+  Status EndLocked();
   Result<Outcome> Play();
   Status PollAll(std::int64_t now_ns);
   Status Homing();
