@@ -1,19 +1,22 @@
 #!/usr/bin/env bash
-# usage: boot.sh LAB RUN SUITE BIN   boots the guest of LAB (see build.sh) and runs SUITE there as root.
-# The guest sees this machine's files read-only with changes kept in its memory, and RUN as /out: what
-# the suite prints goes to RUN/log, the kernel's messages to RUN/dmesg and RUN/console. In the suite
+# usage: boot.sh LAB RUN SUITE BIN [ROOT]   boots the guest of LAB (see build.sh) and runs SUITE there as
+# root. The guest sees this machine's files read-only with changes kept in its memory (those of ROOT where
+# it is given, see debian.sh: with this repository at /src and BIN inside of it), and RUN as /out: what the
+# suite prints goes to RUN/log, the kernel's messages to RUN/dmesg and RUN/console. In the suite
 # $LAB_DIR is tests/lab, $LAB_BIN is BIN, $LAB_SCENE is RUN/../../scene, with a folder for each
 # station (see host/station.sh). A line '# limit: SECONDS' in the suite limits its time
 # (default 180). The exit status is the suite's; 124 when it ran out of time, 125 when the guest died.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
-lab=$1 run=$2 suite=$3 bin=$4
+lab=$1 run=$2 suite=$3 bin=$4 root=${5:-}
 limit=$(sed -n 's/^# limit: \([0-9]\+\).*/\1/p' "$suite" | head -n 1)
 rm -rf "$run"
 mkdir -p "$run"
 cp "$suite" "$run/suite.sh"
 cp "$here/guest/main" "$run/main"
-printf 'LAB_DIR=%q\nLAB_BIN=%q\nLAB_SCENE=%q\n' "$here" "$bin" "$(dirname "$(dirname "$run")")/scene" >"$run/environment"
+dir=$here
+[ -z "$root" ] || dir=/src/tests/lab
+printf 'LAB_DIR=%q\nLAB_BIN=%q\nLAB_SCENE=%q\n' "$dir" "$bin" "$(dirname "$(dirname "$run")")/scene" >"$run/environment"
 
 # The guest's processor is emulated, so nothing depends on what the host can virtualise, and its time
 # counts instructions (4 ns each; while it sleeps it jumps to the next timer): what a suite sees does not
@@ -27,7 +30,7 @@ timeout "${limit:-180}" qemu-system-x86_64 -M pc -accel tcg -icount shift=2,slee
   -device virtio-9p-pci,fsdev=r,mount_tag=hostroot \
   -fsdev "local,id=o,path=$run,security_model=none" -device virtio-9p-pci,fsdev=o,mount_tag=hostout \
   -object rng-random,id=rng0,filename=/dev/urandom -device virtio-rng-pci,rng=rng0 \
-  -append "console=ttyS0 panic=-1 mitigations=off nokaslr random.trust_cpu=on tsc=reliable quiet labmods=$lab/lib/modules" \
+  -append "console=ttyS0 panic=-1 mitigations=off nokaslr random.trust_cpu=on tsc=reliable quiet labmods=$lab/lib/modules${root:+ labroot=$root labsource=$(realpath "$here/../..")}" \
   </dev/null >"$run/qemu.log" 2>&1 || status=$?
 [ "$status" -eq 124 ] && exit 124
 [ -f "$run/status" ] && exit "$(cat "$run/status")"
