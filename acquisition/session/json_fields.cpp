@@ -8,17 +8,14 @@
 namespace scan {
 namespace {
 
-using nlohmann::json;
-using nlohmann::ordered_json;
-
 constexpr double kRotationTolerance = 1e-4;
 
-bool IsFiniteNumber(const json& value) {
+bool IsFiniteNumber(const nlohmann::json& value) {
   return value.is_number() && std::isfinite(value.get<double>());
 }
 
 // Path of the first number that is not finite; empty when all are.
-std::string FindNonFinite(const ordered_json& value, const std::string& path) {
+std::string FindNonFinite(const nlohmann::ordered_json& value, const std::string& path) {
   if (value.is_number_float()) return std::isfinite(value.get<double>()) ? "" : path;
   if (value.is_object())
     for (const auto& [key, member] : value.items())
@@ -33,13 +30,13 @@ std::string FindNonFinite(const ordered_json& value, const std::string& path) {
 
 }  // namespace
 
-Result<json> ParseJson(std::string_view text, const std::string& file) {
+Result<nlohmann::json> ParseJson(std::string_view text, const std::string& file) {
   try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
+    return nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
     return BadInput(fmt::format("not valid JSON near byte {}", error.byte), file,
                     "restore the file or write it again");
-  } catch (const json::exception&) {  // a number beyond the range of double
+  } catch (const nlohmann::json::exception&) {  // a number beyond the range of double
     return BadInput("a number out of range", file, "restore the file or write it again");
   }
 }
@@ -59,7 +56,7 @@ std::string MakeId(std::string_view text) {
   return id;
 }
 
-Result<JsonObject> JsonObject::Root(const json& value, const std::string& file) {
+Result<JsonObject> JsonObject::Root(const nlohmann::json& value, const std::string& file) {
   if (!value.is_object())
     return BadInput("not a JSON object", file, "restore the file or write it again");
   return JsonObject(value, file, "");
@@ -71,7 +68,7 @@ std::vector<std::string> JsonObject::Keys() const {
   return keys;
 }
 
-const json* JsonObject::Member(std::string_view key) const {
+const nlohmann::json* JsonObject::Member(std::string_view key) const {
   const auto found = value_->find(std::string(key));
   return found == value_->end() || found->is_null() ? nullptr : &*found;
 }
@@ -87,13 +84,13 @@ tl::unexpected<Error> JsonObject::Wrong(std::string_view key, std::string what,
   return BadInput(std::move(what), path.empty() ? file_ : file_ + ": " + path, std::move(mend));
 }
 
-Result<const json*> JsonObject::Required(std::string_view key) const {
-  if (const json* member = Member(key)) return member;
+Result<const nlohmann::json*> JsonObject::Required(std::string_view key) const {
+  if (const nlohmann::json* member = Member(key)) return member;
   return Wrong(key, "missing field", "add it");
 }
 
 Result<double> JsonObject::Number(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   if (!IsFiniteNumber(*member)) return Wrong(key, "not a number", "give a finite number");
   return member->get<double>();
 }
@@ -110,7 +107,7 @@ Result<std::optional<double>> JsonObject::OptionalNumber(std::string_view key) c
 }
 
 Result<std::int64_t> JsonObject::Integer(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   if (!member->is_number_integer() ||
       (member->is_number_unsigned() &&
        member->get<std::uint64_t>() > static_cast<std::uint64_t>(INT64_MAX)))
@@ -132,7 +129,7 @@ Result<int> JsonObject::Int(std::string_view key, int low, int high, int absent)
 }
 
 Result<std::string> JsonObject::Text(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   if (!member->is_string()) return Wrong(key, "not a string", "give a string");
   return member->get<std::string>();
 }
@@ -155,7 +152,7 @@ Result<std::string> JsonObject::Id(std::string_view key, std::string absent) con
 }
 
 Result<std::vector<double>> JsonObject::Numbers(std::string_view key, std::size_t count) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   if (!member->is_array() || member->size() != count ||
       !std::all_of(member->begin(), member->end(), IsFiniteNumber))
     return Wrong(key, fmt::format("not a list of {} numbers", count),
@@ -169,10 +166,10 @@ Result<Eigen::Vector3d> JsonObject::Vector3(std::string_view key) const {
 }
 
 Result<Eigen::MatrixXd> JsonObject::Matrix(std::string_view key, int rows, int columns) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   bool good = member->is_array() && member->size() == static_cast<std::size_t>(rows);
   for (int r = 0; good && r < rows; ++r) {
-    const json& row = (*member)[static_cast<std::size_t>(r)];
+    const nlohmann::json& row = (*member)[static_cast<std::size_t>(r)];
     good = row.is_array() && row.size() == static_cast<std::size_t>(columns) &&
            std::all_of(row.begin(), row.end(), IsFiniteNumber);
   }
@@ -188,7 +185,7 @@ Result<Eigen::MatrixXd> JsonObject::Matrix(std::string_view key, int rows, int c
 }
 
 Result<Eigen::Isometry3d> JsonObject::Rigid(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   const int rows = member->is_array() && member->size() == 4 ? 4 : 3;
   SCAN_TRY(const Eigen::MatrixXd matrix, Matrix(key, rows, 4));
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
@@ -210,7 +207,7 @@ Result<std::optional<Eigen::Isometry3d>> JsonObject::OptionalRigid(std::string_v
 }
 
 Result<JsonObject> JsonObject::Object(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   if (!member->is_object()) return Wrong(key, "not an object", "give a JSON object");
   return JsonObject(*member, file_, PathOf(key));
 }
@@ -222,7 +219,7 @@ Result<std::optional<JsonObject>> JsonObject::OptionalObject(std::string_view ke
 }
 
 Result<std::vector<JsonObject>> JsonObject::Objects(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
+  SCAN_TRY(const nlohmann::json* member, Required(key));
   if (!member->is_array()) return Wrong(key, "not a list", "give a list of objects");
   std::vector<JsonObject> objects;
   for (std::size_t i = 0; i < member->size(); ++i) {
@@ -234,36 +231,38 @@ Result<std::vector<JsonObject>> JsonObject::Objects(std::string_view key) const 
 }
 
 Result<std::vector<std::string>> JsonObject::Texts(std::string_view key) const {
-  SCAN_TRY(const json* member, Required(key));
-  if (!member->is_array() || !std::all_of(member->begin(), member->end(),
-                                          [](const json& text) { return text.is_string(); }))
+  SCAN_TRY(const nlohmann::json* member, Required(key));
+  if (!member->is_array() ||
+      !std::all_of(member->begin(), member->end(),
+                   [](const nlohmann::json& text) { return text.is_string(); }))
     return Wrong(key, "not a list of strings", "give a list of strings");
   return member->get<std::vector<std::string>>();
 }
 
-ordered_json JsonRows(const Eigen::MatrixXd& matrix) {
-  ordered_json rows = ordered_json::array();
+nlohmann::ordered_json JsonRows(const Eigen::MatrixXd& matrix) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
-    ordered_json row = ordered_json::array();
+    nlohmann::ordered_json row = nlohmann::ordered_json::array();
     for (Eigen::Index c = 0; c < matrix.cols(); ++c) row.push_back(matrix(r, c));
     rows.push_back(std::move(row));
   }
   return rows;
 }
 
-ordered_json JsonRows(const Eigen::Isometry3d& transform) {
+nlohmann::ordered_json JsonRows(const Eigen::Isometry3d& transform) {
   return JsonRows(Eigen::MatrixXd(transform.matrix().topRows<3>()));
 }
 
-ordered_json JsonVector(const Eigen::Vector3d& vector) {
-  return ordered_json::array({vector.x(), vector.y(), vector.z()});
+nlohmann::ordered_json JsonVector(const Eigen::Vector3d& vector) {
+  return nlohmann::ordered_json::array({vector.x(), vector.y(), vector.z()});
 }
 
-Result<std::string> DumpJson(const ordered_json& value, int indent, const std::string& file) {
+Result<std::string> DumpJson(const nlohmann::ordered_json& value, int indent,
+                             const std::string& file) {
   if (const std::string path = FindNonFinite(value, ""); !path.empty())
     return Failed("a number that is not finite cannot be written", file + ": " + path,
                   "this value must be known before it is written");
-  return value.dump(indent, ' ', false, ordered_json::error_handler_t::replace);
+  return value.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 }  // namespace scan

@@ -11,7 +11,6 @@
 namespace scan {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kReversalPauseNs = 10'000'000;  // lets the rotor come to rest
 constexpr double kOvershootPerBacklash = 1.5;          // takes the play up with some to spare
 constexpr double kLateFraction = 0.25;                 // of the step period
@@ -137,7 +136,7 @@ Status Axis::EmitNext(std::int64_t now_ns) {
 Status Axis::AcceptLateStep(std::int64_t late_ns) {
   const std::int64_t edge = stopping_ ? plan_.count() / 2 : next_edge_;
   const auto speed_squared = static_cast<double>(plan_.SpeedSquared(edge));
-  if (static_cast<double>(late_ns) * std::sqrt(speed_squared) <= kLateFraction * kSecondNs) {
+  if (static_cast<double>(late_ns) * std::sqrt(speed_squared) <= kLateFraction * 1e9) {
     return {};
   }
   // The first step of a ramp already has one step's worth of acceleration.

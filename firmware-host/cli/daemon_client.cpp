@@ -10,7 +10,6 @@ namespace scan {
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{100};
-constexpr std::chrono::milliseconds kPatience{10000};
 
 Result<Json> Outcome(const Json& status, const std::string& session) {
   const std::string outcome = status.value("outcome", "");
@@ -34,12 +33,12 @@ Result<std::unique_ptr<RpcClient>> ConnectDaemon(const std::filesystem::path& so
 
 Result<Json> CaptureAndFollow(RpcClient& daemon, const Json& params, const ProgressFn& progress,
                               std::stop_token stop) {
-  SCAN_CHECK(daemon.Call("capture", params, kPatience));
+  SCAN_CHECK(daemon.Call("capture", params, kDaemonPatience));
   const std::stop_callback on_stop(
-      stop, [&daemon] { (void)daemon.Call("stop", Json::object(), kPatience); });
+      stop, [&daemon] { (void)daemon.Call("stop", Json::object(), kDaemonPatience); });
   OperatorDialogue dialogue;
   while (true) {
-    SCAN_TRY(const Json status, daemon.Call("status", Json::object(), kPatience));
+    SCAN_TRY(const Json status, daemon.Call("status", Json::object(), kDaemonPatience));
     const double count = status.value("view_count", 0);
     const double done = status.value("views_accepted", 0.0) + status.value("views_failed", 0.0);
     Report(progress, "capture", count > 0 ? done / count : 0);

@@ -1,6 +1,7 @@
 // The command line's side of scanstationd's socket.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <stop_token>
@@ -10,6 +11,9 @@
 #include "firmware-host/protocol/rpc_client.h"
 
 namespace scan {
+
+// For its answer to a call.
+inline constexpr std::chrono::milliseconds kDaemonPatience{10000};
 
 Result<std::unique_ptr<RpcClient>> ConnectDaemon(
     const std::filesystem::path& socket,

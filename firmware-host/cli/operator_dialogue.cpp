@@ -7,12 +7,11 @@
 #include <array>
 #include <cstdio>
 
+#include "firmware-host/cli/daemon_client.h"
 #include "firmware-host/cli/terminal_progress.h"
 
 namespace scan {
 namespace {
-
-constexpr std::chrono::milliseconds kPatience{10000};
 
 bool AtTerminal() { return ::isatty(STDIN_FILENO) == 1; }
 
@@ -39,7 +38,7 @@ void OperatorDialogue::Follow(RpcClient& daemon, const std::string& question) {
   const ssize_t count = ::read(STDIN_FILENO, line.data(), line.size());
   if (count <= 0) return;
   const bool no = line[0] == 'n' || line[0] == 'N';
-  (void)daemon.Call("answer", {{"confirmed", !no}, {"note", "terminal"}}, kPatience);
+  (void)daemon.Call("answer", {{"confirmed", !no}, {"note", "terminal"}}, kDaemonPatience);
 }
 
 }  // namespace scan

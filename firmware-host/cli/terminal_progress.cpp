@@ -13,13 +13,13 @@
 namespace scan {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 struct Line {
   std::mutex mutex;
   std::string stage;
-  Clock::time_point stage_start = Clock::now();
-  Clock::time_point last_print{};
+  SteadyClock::time_point stage_start = SteadyClock::now();
+  SteadyClock::time_point last_print{};
 };
 
 std::string Remaining(double elapsed_s, double done) {
@@ -34,7 +34,7 @@ ProgressFn MakeTerminalProgress() {
   auto line = std::make_shared<Line>();
   return [line](std::string_view stage, double done) {
     const std::lock_guard lock(line->mutex);
-    const auto now = Clock::now();
+    const auto now = SteadyClock::now();
     if (line->stage != stage) {
       if (!line->stage.empty()) std::fputc('\n', stderr);
       line->stage = stage;

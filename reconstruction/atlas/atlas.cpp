@@ -18,7 +18,7 @@
 namespace scan {
 namespace {
 
-constexpr std::uint32_t kNone = ~0u;
+constexpr std::uint32_t kNoVertex = ~0u;
 constexpr double kStretchQuantile = 0.01;  // the worst percent of a chart's area
 
 constexpr double kMostWasted = 0.02;
@@ -121,9 +121,9 @@ Result<std::vector<ChartMesh>> UnfoldAll(const TriangleMesh& mesh, const Surface
 
 // Faces without an area share one point of a chart that touches them, else of the first chart.
 void PlaceDegenerateFaces(const TriangleMesh& mesh, const SurfaceGraph& graph, AtlasMesh& atlas) {
-  std::vector<std::uint32_t> host(mesh.vertices.size(), kNone);  // an atlas vertex at each vertex
+  std::vector<std::uint32_t> host(mesh.vertices.size(), kNoVertex);  // an atlas vertex at each vertex
   for (std::uint32_t v = 0; v < atlas.source_vertex.size(); ++v)
-    if (host[atlas.source_vertex[v]] == kNone) host[atlas.source_vertex[v]] = v;
+    if (host[atlas.source_vertex[v]] == kNoVertex) host[atlas.source_vertex[v]] = v;
   std::vector<std::uint32_t> chart_of_vertex(atlas.source_vertex.size(), 0);
   for (std::size_t f = 0; f < mesh.faces.size(); ++f)
     if (!graph.degenerate[f])
@@ -132,7 +132,7 @@ void PlaceDegenerateFaces(const TriangleMesh& mesh, const SurfaceGraph& graph, A
     if (!graph.degenerate[f]) continue;
     std::uint32_t at = 0;
     for (std::size_t k = 3; k-- > 0;)
-      if (host[mesh.faces[f][k]] != kNone) at = host[mesh.faces[f][k]];
+      if (host[mesh.faces[f][k]] != kNoVertex) at = host[mesh.faces[f][k]];
     atlas.chart[f] = chart_of_vertex[at];
     for (std::size_t k = 0; k < 3; ++k) {
       atlas.mesh.faces[f][k] = static_cast<std::uint32_t>(atlas.uv.size());

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/atlas/cross.h"
+
 namespace scan {
 namespace {
 
 using Eigen::Vector2d;
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 double DoubleUvArea(const ChartMesh& chart, const Face& f) {
   return Cross(chart.uv[f[1]] - chart.uv[f[0]], chart.uv[f[2]] - chart.uv[f[0]]);

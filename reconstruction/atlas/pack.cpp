@@ -11,6 +11,8 @@
 #include <numeric>
 #include <optional>
 
+#include "reconstruction/atlas/cross.h"
+
 namespace scan {
 namespace {
 
@@ -58,8 +60,6 @@ Bitmap Turned(const Bitmap& bitmap) {
       if (bitmap.Get(x, y)) turned.Set(bitmap.height() - 1 - y, x);
   return turned;
 }
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 std::vector<Vector2d> ConvexHull(std::vector<Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const Vector2d& a, const Vector2d& b) {

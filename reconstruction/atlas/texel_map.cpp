@@ -5,12 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "reconstruction/atlas/cross.h"
+
 namespace scan {
 namespace {
 
 using Eigen::Vector2d;
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 struct Triangle {
   Vector2d p[3];  // in texels

@@ -13,21 +13,21 @@
 namespace scan {
 namespace {
 
-constexpr std::uint32_t kNone = ~0u;
+constexpr std::uint32_t kAbsent = ~0u;
 
 struct Corner {
-  std::uint32_t vertex = kNone;
-  std::uint32_t uv = kNone;
+  std::uint32_t vertex = kAbsent;
+  std::uint32_t uv = kAbsent;
 };
 
 struct ObjData {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector2d> uvs;
   std::vector<std::array<Corner, 3>> faces;
-  std::vector<std::uint32_t> chart;  // per face, from "g chart_N"; kNone without one
+  std::vector<std::uint32_t> chart;  // per face, from "g chart_N"; kAbsent without one
 };
 
-tl::unexpected<Error> Malformed(const std::string& what, const std::string& where) {
+tl::unexpected<Error> MalformedObj(const std::string& what, const std::string& where) {
   return BadInput("malformed OBJ: " + what, where, "write the mesh again as OBJ or binary PLY");
 }
 
@@ -38,7 +38,7 @@ Result<Eigen::Matrix<double, Size, 1>> ParseVector(std::string_view line,
   for (int axis = 0; axis < Size; ++axis) {
     const auto value = ParseNumber<double>(TakeWord(line));
     if (!value || !std::isfinite(*value))
-      return Malformed("a coordinate is missing, NaN or infinite", where);
+      return MalformedObj("a coordinate is missing, NaN or infinite", where);
     vector[axis] = *value;
   }
   return vector;
@@ -50,11 +50,11 @@ Result<std::uint32_t> ParseIndex(std::string_view word, std::size_t known,
                                  const std::string& where) {
   const auto index = ParseNumber<std::int64_t>(word);
   if (!index || *index == 0)
-    return Malformed(fmt::format("index \"{}\"", word.substr(0, 40)), where);
+    return MalformedObj(fmt::format("index \"{}\"", word.substr(0, 40)), where);
   const std::int64_t from_zero =
       *index > 0 ? *index - 1 : static_cast<std::int64_t>(known) + *index;
-  if (from_zero < 0 || from_zero >= static_cast<std::int64_t>(kNone))
-    return Malformed(fmt::format("index {} after {} entries", *index, known), where);
+  if (from_zero < 0 || from_zero >= static_cast<std::int64_t>(kAbsent))
+    return MalformedObj(fmt::format("index {} after {} entries", *index, known), where);
   return static_cast<std::uint32_t>(from_zero);
 }
 
@@ -79,7 +79,7 @@ Status ParseFace(std::string_view line, std::uint32_t chart, ObjData& data,
     SCAN_TRY(const Corner corner, ParseCorner(word, data, where));
     corners.push_back(corner);
   }
-  if (corners.size() < 3) return Malformed("a face with fewer than three corners", where);
+  if (corners.size() < 3) return MalformedObj("a face with fewer than three corners", where);
   for (std::size_t k = 2; k < corners.size(); ++k) {
     data.faces.push_back({corners[0], corners[k - 1], corners[k]});
     data.chart.push_back(chart);
@@ -90,13 +90,13 @@ Status ParseFace(std::string_view line, std::uint32_t chart, ObjData& data,
 std::uint32_t ChartOfGroup(std::string_view line) {
   const std::string_view name = TakeWord(line);
   constexpr std::string_view kPrefix = "chart_";
-  if (!name.starts_with(kPrefix)) return kNone;
-  return ParseNumber<std::uint32_t>(name.substr(kPrefix.size())).value_or(kNone);
+  if (!name.starts_with(kPrefix)) return kAbsent;
+  return ParseNumber<std::uint32_t>(name.substr(kPrefix.size())).value_or(kAbsent);
 }
 
 Result<ObjData> ParseLines(std::string_view text, const std::string& file) {
   ObjData data;
-  std::uint32_t chart = kNone;
+  std::uint32_t chart = kAbsent;
   std::string joined;
   for (std::size_t line_number = 1; !text.empty(); ++line_number) {
     std::string_view line = TakeLine(text);
@@ -244,7 +244,7 @@ Result<AtlasMesh> ParseAtlasObj(std::string_view text, const std::string& where)
   SCAN_CHECK(CheckMesh(MeshOf(data), where));
   SCAN_CHECK(CheckUvs(data, where));
   const bool has_charts =
-      std::find(data.chart.begin(), data.chart.end(), kNone) == data.chart.end();
+      std::find(data.chart.begin(), data.chart.end(), kAbsent) == data.chart.end();
   return Assemble(data, has_charts ? data.chart : ChartsByUvIslands(data));
 }
 

@@ -63,7 +63,7 @@ std::size_t SizeOf(Scalar type) {
   return 8;
 }
 
-tl::unexpected<Error> Malformed(const std::string& what, const std::string& where) {
+tl::unexpected<Error> MalformedPly(const std::string& what, const std::string& where) {
   return BadInput("malformed PLY: " + what, where, "write the mesh again as binary PLY or OBJ");
 }
 
@@ -72,11 +72,11 @@ Result<Property> ParseProperty(std::string_view line, const std::string& where) 
   std::string_view word = TakeWord(line);
   if (word == "list") {
     property.count_type = ScalarNamed(TakeWord(line));
-    if (!property.count_type) return Malformed("unknown type of a list's length", where);
+    if (!property.count_type) return MalformedPly("unknown type of a list's length", where);
     word = TakeWord(line);
   }
   const auto type = ScalarNamed(word);
-  if (!type) return Malformed(fmt::format("unknown type \"{}\"", word.substr(0, 40)), where);
+  if (!type) return MalformedPly(fmt::format("unknown type \"{}\"", word.substr(0, 40)), where);
   property.type = *type;
   property.name = TakeWord(line);
   return property;
@@ -86,13 +86,13 @@ Result<Property> ParseProperty(std::string_view line, const std::string& where) 
 Result<Header> TakeHeader(std::string_view& text, const std::string& file) {
   Header header;
   bool has_format = false;
-  if (TakeLine(text) != "ply") return Malformed("it does not begin with \"ply\"", file);
+  if (TakeLine(text) != "ply") return MalformedPly("it does not begin with \"ply\"", file);
   for (int line_number = 2; !text.empty(); ++line_number) {
     const std::string where = fmt::format("{}:{}", file, line_number);
     std::string_view line = TakeLine(text);
     const std::string_view key = TakeWord(line);
     if (key == "end_header") {
-      if (!has_format) return Malformed("no format line", file);
+      if (!has_format) return MalformedPly("no format line", file);
       return header;
     }
     if (key == "comment" || key == "obj_info" || key.empty()) continue;
@@ -105,24 +105,24 @@ Result<Header> TakeHeader(std::string_view& text, const std::string& file) {
       else if (name == "binary_big_endian")
         header.encoding = Encoding::big;
       else
-        return Malformed(fmt::format("unknown format \"{}\"", name.substr(0, 40)), where);
+        return MalformedPly(fmt::format("unknown format \"{}\"", name.substr(0, 40)), where);
       has_format = true;
     } else if (key == "element") {
       Element element;
       element.name = TakeWord(line);
       const auto count = ParseNumber<std::uint64_t>(TakeWord(line));
-      if (!count) return Malformed("an element without a count", where);
+      if (!count) return MalformedPly("an element without a count", where);
       element.count = *count;
       header.elements.push_back(std::move(element));
     } else if (key == "property") {
-      if (header.elements.empty()) return Malformed("a property before any element", where);
+      if (header.elements.empty()) return MalformedPly("a property before any element", where);
       SCAN_TRY(Property property, ParseProperty(line, where));
       header.elements.back().properties.push_back(std::move(property));
     } else {
-      return Malformed(fmt::format("unknown header line \"{}\"", key.substr(0, 40)), where);
+      return MalformedPly(fmt::format("unknown header line \"{}\"", key.substr(0, 40)), where);
     }
   }
-  return Malformed("the header has no end", file);
+  return MalformedPly("the header has no end", file);
 }
 
 // The values of the body one after the other, whatever their encoding.
@@ -200,11 +200,11 @@ class MeshBuilder {
     if (element.name != "face") return {};
     if (property.name != "vertex_indices" && property.name != "vertex_index") return {};
     const std::string where = fmt::format("{}: face {}", file_, row);
-    if (values.size() < 3) return Malformed("a face with fewer than three corners", where);
+    if (values.size() < 3) return MalformedPly("a face with fewer than three corners", where);
     for (const double value : values) {
       if (!(value >= 0 && value < static_cast<double>(vertex_count_)) || value != std::floor(value))
-        return Malformed(fmt::format("vertex index {} of {} vertices", value, vertex_count_),
-                         where);
+        return MalformedPly(fmt::format("vertex index {} of {} vertices", value, vertex_count_),
+                            where);
     }
     const auto corner = [&](std::size_t k) { return static_cast<std::uint32_t>(values[k]); };
     for (std::size_t k = 2; k < values.size(); ++k)
@@ -260,16 +260,16 @@ Status CheckHeader(const Header& header, const std::string& file) {
     if (element.name == "face") ++face_elements;
     if (element.name != "vertex") continue;
     ++vertex_elements;
-    if (element.count >= 0xffffffffu) return Malformed("too many vertices", file);
+    if (element.count >= 0xffffffffu) return MalformedPly("too many vertices", file);
     for (const std::string_view axis : {"x", "y", "z"}) {
       int found = 0;
       for (const Property& property : element.properties)
         if (property.name == axis && !property.count_type) ++found;
-      if (found != 1) return Malformed(fmt::format("vertices need one property {}", axis), file);
+      if (found != 1) return MalformedPly(fmt::format("vertices need one property {}", axis), file);
     }
   }
-  if (vertex_elements != 1) return Malformed("it needs one element \"vertex\"", file);
-  if (face_elements > 1) return Malformed("it has several elements \"face\"", file);
+  if (vertex_elements != 1) return MalformedPly("it needs one element \"vertex\"", file);
+  if (face_elements > 1) return MalformedPly("it has several elements \"face\"", file);
   return {};
 }
 

@@ -19,7 +19,7 @@ SharedEstimate EstimateAt(const RigPosterior& posterior, int index, double value
 
 RigPosterior PosteriorOf(const RigModel& rig, const RefineResult& fit) {
   RigPosterior posterior{RigLayout(rig), {}, {}};
-  posterior.prior_sigma = PriorSigma(rig, posterior.layout);
+  posterior.prior_sigma = PriorSigmas(rig, posterior.layout);
   std::vector<std::optional<CondensedEvidence>> evidence;
   for (const ViewFit& view : fit.fits) evidence.push_back(view.evidence);
   const Eigen::MatrixXd information =

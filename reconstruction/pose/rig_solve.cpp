@@ -155,7 +155,7 @@ RigLayout::RigLayout(const RigModel& rig) {
   size = views_ + 8 * static_cast<int>(rig.views().size());
 }
 
-Eigen::VectorXd PriorSigma(const RigModel& rig, const RigLayout& layout) {
+Eigen::VectorXd PriorSigmas(const RigModel& rig, const RigLayout& layout) {
   // A prior of zero width is a narrow one, so that every direction stays finite: 0.00006 degrees
   // and 10 nm, far below what a photograph shows.
   constexpr double kRotation = 1e-6, kLength = 1e-5;
@@ -191,7 +191,7 @@ Eigen::VectorXd PriorSigma(const RigModel& rig, const RigLayout& layout) {
 double SolveRig(const RigModel& rig, std::span<const std::optional<CondensedEvidence>> evidence,
                 RigParameters& parameters) {
   const RigLayout layout(rig);
-  Eigen::VectorXd sigma = PriorSigma(rig, layout);
+  Eigen::VectorXd sigma = PriorSigmas(rig, layout);
   for (int lens = 0; lens < static_cast<int>(rig.lens_sigma().size()); ++lens)
     for (int k = 0; k < 3; ++k)
       if (rig.held(lens, k)) sigma[layout.lens(lens) + k] = k == 0 ? 1e-9 : 1e-6;
@@ -264,7 +264,7 @@ Eigen::MatrixXd ViewJacobian(const RigModel& rig, const RigLayout& layout,
 Eigen::MatrixXd RigInformation(const RigModel& rig, const RigLayout& layout,
                                std::span<const std::optional<CondensedEvidence>> evidence,
                                const RigParameters& parameters) {
-  Eigen::MatrixXd information = PriorSigma(rig, layout).cwiseAbs2().cwiseInverse().asDiagonal();
+  Eigen::MatrixXd information = PriorSigmas(rig, layout).cwiseAbs2().cwiseInverse().asDiagonal();
   for (int i = 0; i < static_cast<int>(rig.views().size()); ++i) {
     if (!evidence[i]) continue;
     const Eigen::MatrixXd J = ViewJacobian(rig, layout, parameters, i, evidence[i]->pivot);

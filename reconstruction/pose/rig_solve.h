@@ -29,7 +29,7 @@ struct RigLayout {
 };
 
 // One standard deviation of every parameter's prior, in the order of the layout.
-Eigen::VectorXd PriorSigma(const RigModel& rig, const RigLayout& layout);
+Eigen::VectorXd PriorSigmas(const RigModel& rig, const RigLayout& layout);
 
 // Moves `parameters` to the minimum of  1/2 sum (x / sigma)^2 + sum of the views' quadratic forms.
 // Lens parameters that the rig holds stay at their nominal value.

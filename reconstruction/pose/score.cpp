@@ -10,11 +10,11 @@ namespace scan {
 namespace {
 
 // Surface points under every few pixels of a picture reduced to this longest side.
-constexpr int kSide = 320;
+constexpr int kPictureSide = 320;
 
 std::vector<Eigen::Vector3d> VisiblePoints(const TriangleMesh& mesh, const PoseOf& truth) {
-  const double scale =
-      std::min(1.0, static_cast<double>(kSide) / std::max(truth.intrinsics.w, truth.intrinsics.h));
+  const double scale = std::min(
+      1.0, static_cast<double>(kPictureSide) / std::max(truth.intrinsics.w, truth.intrinsics.h));
   const Intrinsics small =
       Scaled(truth.intrinsics, std::max(1, static_cast<int>(scale * truth.intrinsics.w)),
              std::max(1, static_cast<int>(scale * truth.intrinsics.h)));
