@@ -1,7 +1,7 @@
 # One folder, one target, its links listed.
 #   scan_library(scan_base SOURCES a.cpp b.cpp LINKS Eigen3::Eigen PRIVATE_LINKS OpenSSL::Crypto)
 #   scan_program(scanstation SOURCES main.cpp LINKS ...)
-#   scan_test(unit_base SOURCES result_test.cpp LINKS scan_base [LABELS quick] [TIMEOUT 60] [DATA])
+#   scan_test(unit_base SOURCES result_test.cpp LINKS scan_base [LABELS quick] [TIMEOUT 60])
 
 add_library(scan_warnings INTERFACE)
 target_compile_options(scan_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -10,7 +10,8 @@ if(SCAN_WERROR)
   target_compile_options(scan_warnings INTERFACE -Werror)
 endif()
 
-# NO_UNITY: its files use the same names for different things, so none is compiled with another.
+# NO_UNITY: none of its files is compiled with another, as they use the same names for different
+# things (or types of an unnamed namespace as members).
 function(scan_library name)
   cmake_parse_arguments(ARG "NO_UNITY" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   if(ARG_SOURCES)
@@ -34,7 +35,7 @@ function(scan_program name)
 endfunction()
 
 function(scan_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "NO_UNITY" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS quick)
   endif()
@@ -48,6 +49,9 @@ function(scan_test name)
     endif()
   endforeach()
   add_executable(${name} ${ARG_SOURCES})
+  if(ARG_NO_UNITY)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
+  endif()
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR})
   # Only where it is used: a path in the command line keeps compilers' caches from being shared.
   foreach(source ${ARG_SOURCES})

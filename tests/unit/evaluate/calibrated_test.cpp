@@ -14,7 +14,7 @@ namespace {
 using ModelFromModel = Transform<frame::Model, frame::Model>;
 
 // One turn of the platter seen by one aim; solved and calibrated cameras are both the truth.
-struct Case {
+struct CalibratedCase {
   TriangleMesh mesh = test::BugMesh(2);
   test::Scene scene;
   Poses poses;
@@ -25,8 +25,8 @@ struct Case {
   }
 };
 
-Case MakeCase() {
-  Case c;
+CalibratedCase MakeCalibratedCase() {
+  CalibratedCase c;
   test::SceneOptions options;
   options.w = 462;
   options.h = 306;
@@ -50,7 +50,7 @@ Case MakeCase() {
 }
 
 TEST(CompareWithCalibrated, TheSameCamerasAgree) {
-  const auto figures = MakeCase().Compare();
+  const auto figures = MakeCalibratedCase().Compare();
   ASSERT_TRUE(figures) << ToString(figures.error());
   EXPECT_EQ(figures->views, 6u);
   EXPECT_EQ(figures->accepted, 6u);
@@ -63,7 +63,7 @@ TEST(CompareWithCalibrated, TheSameCamerasAgree) {
 }
 
 TEST(CompareWithCalibrated, RotationsDoNotDependOnTheCalibrationsOwnFrame) {
-  Case c = MakeCase();
+  CalibratedCase c = MakeCalibratedCase();
   const ModelFromModel own(ExpSo3({0.4, 1.1, -0.8}), Eigen::Vector3d(30, -20, 5));
   for (auto& [name, pose] : c.calibrated.views) pose = pose * own;
   const auto figures = c.Compare();
@@ -74,7 +74,7 @@ TEST(CompareWithCalibrated, RotationsDoNotDependOnTheCalibrationsOwnFrame) {
 }
 
 TEST(CompareWithCalibrated, ErrorsComeOutInTheirUnits) {
-  Case c = MakeCase();
+  CalibratedCase c = MakeCalibratedCase();
   // One camera of six turned by a degree: both steps to its neighbours are off by as much.
   CameraFromModel& turned = c.poses.views[2].camera_from_model;
   turned = CameraFromModel(ExpSo3({0, 0, RadFromDeg(1)}) * turned.rotation(), turned.translation());
@@ -90,7 +90,7 @@ TEST(CompareWithCalibrated, ErrorsComeOutInTheirUnits) {
 }
 
 TEST(CompareWithCalibrated, AShiftedModelMovesItsOutline) {
-  Case c = MakeCase();
+  CalibratedCase c = MakeCalibratedCase();
   // 0.5 mm to the right at about 550 mm: 1.25 px.
   for (ViewPose& view : c.poses.views)
     view.camera_from_model =
@@ -104,7 +104,7 @@ TEST(CompareWithCalibrated, AShiftedModelMovesItsOutline) {
 }
 
 TEST(CompareWithCalibrated, LensParametersBesideTheNominalAndTheCalibrated) {
-  Case c = MakeCase();
+  CalibratedCase c = MakeCalibratedCase();
   const Intrinsics nominal = c.scene.photos.lens_states[0].intrinsics;
   c.calibrated.intrinsics.cx = nominal.cx + 3;
   c.calibrated.intrinsics.fl_x = 1.01 * nominal.fl_x;
@@ -122,12 +122,12 @@ TEST(CompareWithCalibrated, LensParametersBesideTheNominalAndTheCalibrated) {
 }
 
 TEST(CompareWithCalibrated, TooFewViewsOrOtherPicturesAreBadInput) {
-  Case c = MakeCase();
+  CalibratedCase c = MakeCalibratedCase();
   c.calibrated.intrinsics.w *= 2;
   auto figures = c.Compare();
   ASSERT_FALSE(figures);
   EXPECT_NE(ToString(figures.error()).find("924 x 306"), std::string::npos);
-  c = MakeCase();
+  c = MakeCalibratedCase();
   for (std::size_t i = 0; i < 2; ++i) c.poses.views[i].status = ViewStatus::rejected;
   c.calibrated.views.erase(c.poses.views[3].name);
   figures = c.Compare();

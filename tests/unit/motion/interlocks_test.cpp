@@ -14,18 +14,18 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr AxisCommand kCommands[] = {AxisCommand::home,    AxisCommand::move,
-                                     AxisCommand::stop,    AxisCommand::abort,
-                                     AxisCommand::release, AxisCommand::acknowledge};
+constexpr AxisCommand kEveryCommand[] = {AxisCommand::home,    AxisCommand::move,
+                                         AxisCommand::stop,    AxisCommand::abort,
+                                         AxisCommand::release, AxisCommand::acknowledge};
 
 TEST(Interlocks, EachForbidsWhatItsRowSaysFromItsCauseToItsMend) {
   for (const InterlockRow& row : kInterlockTable) {
     Interlocks interlocks;
-    for (const AxisCommand command : kCommands) EXPECT_TRUE(interlocks.Permit(command));
+    for (const AxisCommand command : kEveryCommand) EXPECT_TRUE(interlocks.Permit(command));
     interlocks.Raise(row.interlock);
     EXPECT_EQ(interlocks.alarm(), row.alarm);
     EXPECT_EQ(interlocks.Words(), row.name);
-    for (const AxisCommand command : kCommands) {
+    for (const AxisCommand command : kEveryCommand) {
       EXPECT_EQ(interlocks.Permit(command).has_value(), !Forbids(row.interlock, command))
           << row.name;
     }

@@ -13,7 +13,7 @@
 namespace scan {
 namespace {
 
-const test::SceneOptions kSmall{.w = 462, .h = 306, .views = 6};
+const test::SceneOptions kSmallView{.w = 462, .h = 306, .views = 6};
 
 const TableFromModel kPlacing(ExpSo3({0.1, -0.15, 1.3}), Eigen::Vector3d(1.5, -2, 1));
 
@@ -43,7 +43,7 @@ TEST(RefineView, ReturnsFromAFewDegreesAndMillimetres) {
 
 TEST(SolveJoint, PhotographsWithoutAPoseJoinThroughTheModel) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::Scene scene = test::MakeScene(mesh, kPlacing, kSmall);
+  test::Scene scene = test::MakeScene(mesh, kPlacing, kSmallView);
   ForgetPose(scene.photos.photos[1]);
   ForgetPose(scene.photos.photos[4]);
   scene.photos.approx_distance_mm = 550;
@@ -110,7 +110,7 @@ TEST(CorrelationLength, FindsTheIntegralOfTheAutocorrelation) {
 
 TEST(ExcludeBelow, IgnoresWhatStandsBelowAHeightOnTheAxis) {
   const TriangleMesh mesh = test::BugMesh(1);
-  test::Scene scene = test::MakeScene(mesh, kPlacing, kSmall);
+  test::Scene scene = test::MakeScene(mesh, kPlacing, kSmallView);
   ASSERT_TRUE(ExcludeBelow(scene.photos, 3.0, scene.masks));
   for (std::size_t i = 0; i < scene.masks.size(); ++i) {
     const Photo& photo = scene.photos.photos[i];
