@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
 
 #include "drivers/base/result.h"
 
@@ -21,5 +24,9 @@ class StepPort {
   virtual Result<bool> Endstop() = 0;
   virtual Result<bool> Index() = 0;
 };
+
+// Puts something between an axis and its port.
+using StepPortWrap =
+    std::function<std::unique_ptr<StepPort>(const std::string& axis, std::unique_ptr<StepPort>)>;
 
 }  // namespace scan
