@@ -20,6 +20,7 @@ struct HomingConfig {
   double slow = 1;        // over the edge, always in the sense of `approach`; <= self_start
   double back_off = 2;    // before that; where the switch is left, it goes so deep into it
   double max_travel = 0;  // the switch must come within this
+  int repeat_steps = 4;   // two slow approaches may differ by this
   friend bool operator==(const HomingConfig&, const HomingConfig&) = default;
 };
 

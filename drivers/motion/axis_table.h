@@ -29,8 +29,16 @@ enum class AxisEvent {
 };
 constexpr std::size_t kAxisEvents = 9;
 
-enum class Interlock { cover_open, heartbeat_lost, limit_switch, late_step, emergency_stop };
-constexpr std::size_t kInterlocks = 5;
+enum class Interlock {
+  cover_open,
+  heartbeat_lost,
+  limit_switch,
+  late_step,
+  emergency_stop,
+  motor_power_off,     // the motors' supply is not there
+  motor_power_not_cut  // it is there, although the emergency stop should have cut it
+};
+constexpr std::size_t kInterlocks = 7;
 
 // How a motion that runs is ended.
 enum class MotionEnd { none, stop, abort, power_cut };
@@ -115,6 +123,11 @@ constexpr std::array<InterlockRow, kInterlocks> kInterlockTable{{
     {Interlock::late_step, "late step", Bit(AxisCommand::move), MotionEnd::abort, Alarm::invalid,
      true},
     {Interlock::emergency_stop, "emergency stop",
+     Bit(AxisCommand::home) | Bit(AxisCommand::move) | Bit(AxisCommand::release),
+     MotionEnd::power_cut, Alarm::invalid, true},
+    {Interlock::motor_power_off, "motor power off", Bit(AxisCommand::home) | Bit(AxisCommand::move),
+     MotionEnd::power_cut, Alarm::invalid, true},
+    {Interlock::motor_power_not_cut, "motor power not cut by the emergency stop",
      Bit(AxisCommand::home) | Bit(AxisCommand::move) | Bit(AxisCommand::release),
      MotionEnd::power_cut, Alarm::invalid, true},
 }};

@@ -12,7 +12,6 @@ namespace scan {
 namespace {
 
 constexpr std::int64_t kStartDelayNs = 1'000'000;  // from the decision to the time base of a move
-constexpr std::int64_t kRepeatSteps = 4;           // two slow approaches may differ by this
 
 }  // namespace
 
@@ -80,6 +79,11 @@ void StepperMotion::SetInterlock(Interlock interlock, bool present) {
         abort_requested_ = true;
         break;
       case MotionEnd::power_cut:
+        // A supply that goes because of the emergency stop is no cause of its own.
+        cut_by_ =
+            interlock == Interlock::motor_power_off && interlocks_.IsUp(Interlock::emergency_stop)
+                ? Interlock::emergency_stop
+                : interlock;
         if (!running_) CutAll();
         cut_requested_ = true;
         break;
@@ -108,7 +112,7 @@ void StepperMotion::AbortAll() {
 
 void StepperMotion::CutAll() {
   for (Axis* axis : {parts_.turntable.get(), parts_.lift.get()}) {
-    axis->CutPower(std::string(Row(Interlock::emergency_stop).name));
+    axis->CutPower(std::string(Row(cut_by_).name));
   }
 }
 
@@ -128,8 +132,14 @@ Status StepperMotion::EndAll(std::span<Axis* const> axes) {
 Error StepperMotion::EndError(Outcome outcome) {
   if (outcome == Outcome::power_cut) {
     return {ErrorKind::device,
-            "emergency stop: the motors are without power, the position is unknown", "stage",
-            "release it, acknowledge it (scanstation device motion acknowledge), home the stage"};
+            fmt::format("{}: the motors are without {}, the position is unknown", Row(cut_by_).name,
+                        cut_by_ == Interlock::motor_power_not_cut ? "current" : "power"),
+            "stage",
+            cut_by_ == Interlock::emergency_stop
+                ? "release it, acknowledge it (scanstation device motion acknowledge), home the "
+                  "stage"
+                : "check the contact that cuts the motors' supply and the line that reads it back, "
+                  "acknowledge it (scanstation device motion acknowledge), home the stage"};
   }
   if (outcome == Outcome::aborted) {
     return {ErrorKind::device, "motion was aborted, the position is unknown", "stage",
@@ -464,11 +474,12 @@ Status StepperMotion::FindEdgeSlowly(Axis& axis, bool ran_into) {
     }
     counts[round] = axis.counted_steps();
   }
-  if (std::abs(counts[1] - counts[0]) > kRepeatSteps) {
+  if (std::abs(counts[1] - counts[0]) > homing.repeat_steps) {
     return HomingFault(axis,
                        fmt::format("home switch came {} steps apart on two approaches",
                                    std::abs(counts[1] - counts[0])),
-                       "check the switch for bounce and the axis for lost steps");
+                       "check the switch for bounce and the axis for lost steps, or raise "
+                       "homing.repeat_steps for a switch as coarse as a stall");
   }
   std::lock_guard lock(mutex_);
   axis.SetReference();

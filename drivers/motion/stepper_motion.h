@@ -88,6 +88,7 @@ class StepperMotion final : public Motion {
   bool abort_requested_ = false;
   bool cut_requested_ = false;
   std::optional<Interlock> stopped_by_;
+  Interlock cut_by_ = Interlock::emergency_stop;
   Interlocks interlocks_;
   MotionRecord record_;
   bool running_ = false;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "drivers/motion/tic/tic_protocol.h"
+#include "drivers/motion/tmc2209/tmc2209_protocol.h"
 
 namespace scan {
 namespace {
@@ -115,11 +116,36 @@ Status ValidateTic(const AxisConfig& axis, const TicAxisWiring& wiring) {
   return {};
 }
 
+Status ValidateTmc2209Of(const AxisConfig& axis, const Tmc2209Config& config) {
+  if (config.port.empty()) return {};
+  const Status valid = ValidateTmc2209(config);
+  if (valid) return {};
+  return BadInput(valid.error().what,
+                  fmt::format("axis.{}.tmc2209.{}", axis.name, valid.error().where),
+                  valid.error().mend);
+}
+
+Status ValidateTmc2209s(const StationConfig& config) {
+  const Tmc2209Config &turntable = config.turntable_tmc2209, &lift = config.lift_tmc2209;
+  SCAN_CHECK(ValidateTmc2209Of(config.turntable, turntable));
+  SCAN_CHECK(ValidateTmc2209Of(config.lift, lift));
+  if (!turntable.port.empty() && turntable.port == lift.port && turntable.address == lift.address) {
+    return BadInput("both axes name the same driver", "axis.lift.tmc2209.address",
+                    "name an address each");
+  }
+  return {};
+}
+
 Status ValidateDriver(const StationConfig& config) {
   if (config.motion_driver == MotionDriver::sim) return {};
   if (config.motion_driver == MotionDriver::gpio) {
+    if (config.gpio.motor_power && !config.gpio.emergency_stop) {
+      return BadInput("the motors' supply is read back, but no emergency stop is wired",
+                      "motion.emergency_stop", "name its line");
+    }
     SCAN_CHECK(ValidateWiring(config.turntable, config.gpio.turntable));
     SCAN_CHECK(ValidateWiring(config.lift, config.gpio.lift));
+    SCAN_CHECK(ValidateTmc2209s(config));
   } else {
     SCAN_CHECK(ValidateTic(config.turntable, config.tic.turntable));
     SCAN_CHECK(ValidateTic(config.lift, config.tic.lift));
@@ -131,6 +157,21 @@ Status ValidateDriver(const StationConfig& config) {
   if (config.lift_geometry.kind == "pitch_axis" && config.aims.size() > 1) {
     return BadInput("no driver moves the camera's pitch on this station", "axis.lift.kind",
                     "choose fixed_pitch, arc or manual_aim, or keep one aim");
+  }
+  return {};
+}
+
+Status ValidateLight(const LightConfig& light) {
+  if (light.driver == LightDriver::gpio && !light.line) {
+    return BadInput("the lamp has no line", "light.line", "name it");
+  }
+  if (light.driver == LightDriver::gpio && light.level != 1) {
+    return BadInput("a lamp on a line is on or off", "light.level",
+                    "leave it out, or put the lamp on a PWM output");
+  }
+  if (light.driver == LightDriver::pwm && light.chip.empty()) {
+    return BadInput("the lamp has no PWM chip", "light.chip",
+                    "name its device ('ls -l /sys/class/pwm/*/device')");
   }
   return {};
 }
@@ -245,6 +286,7 @@ Status Validate(const StationConfig& config) {
                     "choose hold or brake, or set self_locking = true if its drive locks itself");
   }
   SCAN_CHECK(ValidateDriver(config));
+  SCAN_CHECK(ValidateLight(config.light));
   SCAN_CHECK(ValidateIds(config.cameras, "camera"));
   SCAN_CHECK(ValidateIds(config.aims, "aim"));
   const auto& d = config.lift_geometry.direction_in_station;

@@ -11,9 +11,11 @@
 
 #include "drivers/base/result.h"
 #include "drivers/camera/v4l2/v4l2_config.h"
+#include "drivers/io/light_config.h"
 #include "drivers/motion/axis_config.h"
 #include "drivers/motion/gpio/gpio_motion_config.h"
 #include "drivers/motion/tic/tic_config.h"
+#include "drivers/motion/tmc2209/tmc2209_config.h"
 
 namespace scan {
 
@@ -137,8 +139,10 @@ enum class MotionDriver { sim, gpio, tic };
 struct StationConfig {
   std::string name = "simulated station";
   MotionDriver motion_driver = MotionDriver::sim;
-  GpioMotionConfig gpio;  // of the gpio driver
-  TicMotionConfig tic;    // of the tic driver
+  GpioMotionConfig gpio;                          // of the gpio driver
+  TicMotionConfig tic;                            // of the tic driver
+  Tmc2209Config turntable_tmc2209, lift_tmc2209;  // beside the gpio driver
+  LightConfig light;
   AxisConfig turntable, lift;
   LiftGeometry lift_geometry;
   std::vector<CameraConfig> cameras;

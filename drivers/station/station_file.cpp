@@ -24,6 +24,7 @@ void ReadHoming(TomlReader& in, HomingConfig& homing) {
   in.Number("slow", homing.slow, 1e-3, 1e4);
   in.Number("back_off", homing.back_off, 1e-3, 1e3);
   in.Number("max_travel", homing.max_travel, 1e-3, kFar);
+  in.Integer("repeat_steps", homing.repeat_steps, 0, 10'000);
 }
 
 void ReadPin(TomlReader& in, const char* key, GpioPin& pin) {
@@ -49,10 +50,34 @@ void ReadWiring(TomlReader& in, GpioAxisWiring& wiring) {
   in.Number("enable_ms", wiring.enable_ms, 0, 1000);
 }
 
+void ReadLight(TomlReader& in, LightConfig& light) {
+  if (const auto word = in.Word("driver", {"none", "gpio", "pwm"})) {
+    light.driver = static_cast<LightDriver>(*word);
+  }
+  in.Text("chip", light.chip);
+  ReadPin(in, "line", light.line);
+  in.Integer("channel", light.channel, 0, 255);
+  in.Flag("active_low", light.active_low);
+  in.Number("period_us", light.period_us, 1, 1e6);
+  in.Number("level", light.level, 0.001, 1);
+  in.Number("settle_ms", light.settle_ms, 0, 60'000);
+}
+
 void ReadTic(TomlReader& in, TicAxisWiring& wiring) {
   in.Text("serial", wiring.serial);
   in.Text("port", wiring.port);
   in.Integer("microsteps", wiring.microsteps, 0, 256);
+}
+
+void ReadTmc2209(TomlReader& in, Tmc2209Config& config) {
+  in.Text("port", config.port);
+  in.Integer("address", config.address, 0, 3);
+  in.Integer("microsteps", config.microsteps, 1, 256);
+  in.Number("run_ma", config.run_ma, 1, 3000);
+  in.Number("hold_ma", config.hold_ma, 0, 3000);
+  in.Number("sense_mohm", config.sense_mohm, 10, 1000);
+  in.Flag("stealth_chop", config.stealth_chop);
+  in.Integer("stall_threshold", config.stall_threshold, 0, 255);
 }
 
 void ReadMotion(TomlReader& in, StationConfig& config) {
@@ -63,6 +88,8 @@ void ReadMotion(TomlReader& in, StationConfig& config) {
   in.Text("chip", config.gpio.chip);
   ReadPin(in, "emergency_stop", config.gpio.emergency_stop);
   ReadPin(in, "cover", config.gpio.cover);
+  ReadPin(in, "motor_power", config.gpio.motor_power);
+  in.Number("power_off_ms", config.gpio.power_off_ms, 1, 10'000);
   in.Integer("priority", config.gpio.real_time.priority, 0, 99);
   int core = -1;
   in.Integer("core", core, -1, 1023);
@@ -217,11 +244,13 @@ void ReadAxes(TomlReader& in, StationConfig& config) {
     ReadAxis(axis, config.turntable);
     axis.Table("gpio", [&](TomlReader& gpio) { ReadWiring(gpio, config.gpio.turntable); });
     axis.Table("tic", [&](TomlReader& tic) { ReadTic(tic, config.tic.turntable); });
+    axis.Table("tmc2209", [&](TomlReader& tmc) { ReadTmc2209(tmc, config.turntable_tmc2209); });
   });
   in.Table("lift", [&](TomlReader& axis) {
     ReadAxis(axis, config.lift);
     axis.Table("gpio", [&](TomlReader& gpio) { ReadWiring(gpio, config.gpio.lift); });
     axis.Table("tic", [&](TomlReader& tic) { ReadTic(tic, config.tic.lift); });
+    axis.Table("tmc2209", [&](TomlReader& tmc) { ReadTmc2209(tmc, config.lift_tmc2209); });
     const std::vector<std::string> kinds{"fixed_pitch", "manual_aim", "arc", "pitch_axis"};
     if (const auto word = axis.Word("kind", kinds)) config.lift_geometry.kind = kinds[*word];
     axis.Vector3("direction_in_station", config.lift_geometry.direction_in_station.data(), -1, 1);
@@ -257,6 +286,7 @@ Result<StationConfig> ParseStationConfig(std::string_view text, const std::strin
   TomlReader in(root, source, "", error);
   in.Text("name", config.name);
   in.Table("motion", [&](TomlReader& motion) { ReadMotion(motion, config); });
+  in.Table("light", [&](TomlReader& light) { ReadLight(light, config.light); });
   in.Table("axis", [&](TomlReader& axes) { ReadAxes(axes, config); });
   in.Tables("camera", config.cameras, ReadCamera);
   in.Tables("aim", config.aims, ReadAim);

@@ -44,8 +44,12 @@ Result<std::unique_ptr<DeviceHost>> DeviceHost::Start(const StationConfig& confi
   }
   std::unique_ptr<DeviceHost> host(new DeviceHost(operator_prompt));
   SCAN_TRY(UniqueFd fd, ConnectUnix(motion_socket, kMotionPatience));
-  host->station_.motion = std::make_unique<MotionClient>(std::move(fd));
   host->station_.clock = std::make_shared<SystemClock>();
+  auto motion = std::make_unique<MotionClient>(std::move(fd));
+  if (config.light.driver != LightDriver::none) {
+    host->station_.light = motion->MakeLight(host->station_.clock);
+  }
+  host->station_.motion = std::move(motion);
   for (const CameraConfig& camera : config.cameras) {
     SCAN_TRY(host->station_.cameras[camera.id], OpenCamera(camera, host->station_.clock));
   }

@@ -1,4 +1,4 @@
-// The real station: cameras of this process, motion in scanstation-motiond.
+// The real station: cameras of this process, motion and lamp in scanstation-motiond.
 #pragma once
 
 #include <filesystem>
@@ -11,8 +11,8 @@
 
 namespace scan {
 
-// The specimen is taken off and put back by a person, asked through `operator_prompt`. The station
-// has no lamp of its own here: its light is on as long as the room's is.
+// The specimen is taken off and put back by a person, asked through `operator_prompt`. A
+// station without a lamp has the room's light, which is on as long as somebody leaves it so.
 class DeviceHost final : public StationHost {
  public:
   // Preconditions: the configuration is valid; `operator_prompt` outlives the host.

@@ -1,4 +1,5 @@
-// scanstation-motiond: owns everything that moves; its clients talk to it over a Unix socket.
+// scanstation-motiond: owns everything that moves, and the lamp; its clients talk to it over a Unix
+// socket.
 #include <fmt/format.h>
 #include <signal.h>
 
@@ -8,6 +9,7 @@
 #include "drivers/base/log.h"
 #include "drivers/base/sha256.h"
 #include "drivers/station/station_file.h"
+#include "firmware-host/devices/open_lamp.h"
 #include "firmware-host/devices/open_motion.h"
 #include "firmware-host/protocol/motion_server.h"
 
@@ -24,8 +26,10 @@ Status Serve(const std::filesystem::path& config_path, const std::filesystem::pa
   SCAN_TRY(const std::string text, ReadTextFile(config_path));
   SCAN_TRY(const StationConfig config, ParseStationConfig(text, config_path.string()));
   SCAN_TRY(const std::unique_ptr<Motion> motion, OpenMotion(config));
+  SCAN_TRY(const std::unique_ptr<Lamp> lamp, OpenLamp(config));
   SCAN_TRY(const auto server,
-           ListenForMotion(socket, *motion, {config.name, Sha256Hex(AsBytes(text))}));
+           ListenForMotion(socket, *motion, {config.name, Sha256Hex(AsBytes(text))},
+                           {lamp.get(), config.light.level, config.light.settle_ms}));
   Log(LogLevel::info, "ready", {{"socket", socket.string()}, {"station", config.name}});
   int signal = 0;
   sigwait(&signals, &signal);

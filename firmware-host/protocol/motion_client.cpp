@@ -1,5 +1,6 @@
 #include "firmware-host/protocol/motion_client.h"
 
+#include <cmath>
 #include <condition_variable>
 #include <mutex>
 
@@ -8,7 +9,7 @@
 
 namespace scan {
 
-MotionClient::MotionClient(UniqueFd fd)
+MotionLink::MotionLink(UniqueFd fd)
     : client_(std::move(fd)), heartbeat_([this](std::stop_token stop) {
         std::mutex mutex;
         std::condition_variable_any wake;
@@ -19,13 +20,46 @@ MotionClient::MotionClient(UniqueFd fd)
         }
       }) {}
 
+namespace {
+
+class LightClient final : public Light {
+ public:
+  LightClient(std::shared_ptr<MotionLink> link, std::shared_ptr<Clock> clock)
+      : link_(std::move(link)), clock_(std::move(clock)) {}
+
+  Status Set(bool on) override {
+    SCAN_TRY(const Json answer,
+             link_->client().Call("set_light", Json{{"on", on}}, kHeartbeatLimit));
+    const double settle_ms = answer.is_object() ? answer.value("settle_ms", 0.0) : 0.0;
+    clock_->SleepFor(std::llround(settle_ms * 1e6));
+    return {};
+  }
+
+ private:
+  std::shared_ptr<MotionLink> link_;
+  std::shared_ptr<Clock> clock_;
+};
+
+}  // namespace
+
+MotionClient::MotionClient(UniqueFd fd) : link_(std::make_shared<MotionLink>(std::move(fd))) {}
+
+std::unique_ptr<Light> MotionClient::MakeLight(std::shared_ptr<Clock> clock) {
+  return std::make_unique<LightClient>(link_, std::move(clock));
+}
+
+Status MotionClient::SetLightLevel(double level) {
+  SCAN_CHECK(link_->client().Call("set_light", Json{{"level", level}}, kHeartbeatLimit));
+  return {};
+}
+
 // A stop request is sent beside the running call, which then ends with its own answer: the position
 // after the ramp stays known.
 Result<Json> MotionClient::CallStoppable(const std::string& function, Json params,
                                          std::stop_token stop) {
   if (stop.stop_requested()) return Cancelled("motion");
   const std::stop_callback on_stop(stop, [this] { (void)Stop(); });
-  return client_.Call(function, std::move(params));
+  return link_->client().Call(function, std::move(params));
 }
 
 Result<HomeReport> MotionClient::Home(std::stop_token stop) {
@@ -39,22 +73,22 @@ Result<MoveReport> MotionClient::MoveTo(const StageTarget& target, std::stop_tok
 }
 
 Status MotionClient::Stop() {
-  SCAN_CHECK(client_.Call("stop", Json::object(), kHeartbeatLimit));
+  SCAN_CHECK(link_->client().Call("stop", Json::object(), kHeartbeatLimit));
   return {};
 }
 
 Status MotionClient::Abort() {
-  SCAN_CHECK(client_.Call("abort", Json::object(), kHeartbeatLimit));
+  SCAN_CHECK(link_->client().Call("abort", Json::object(), kHeartbeatLimit));
   return {};
 }
 
 Status MotionClient::Acknowledge() {
-  SCAN_CHECK(client_.Call("acknowledge", Json::object(), kHeartbeatLimit));
+  SCAN_CHECK(link_->client().Call("acknowledge", Json::object(), kHeartbeatLimit));
   return {};
 }
 
 MotionStatus MotionClient::ReadStatus() {
-  const auto answer = client_.Call("status", Json::object(), kHeartbeatLimit);
+  const auto answer = link_->client().Call("status", Json::object(), kHeartbeatLimit);
   if (answer)
     if (const auto status = MotionStatusFromJson(*answer)) return *status;
   MotionStatus lost;

@@ -23,6 +23,60 @@ Result<Json> MoveAlone(std::mutex& moving, Move move) {
   return move();
 }
 
+// Who has switched the lamp on; shared by all connections.
+class LampDesk {
+ public:
+  explicit LampDesk(const ServedLamp& served) : served_(served) {}
+
+  Result<Json> Set(const void* client, const Json& params) {
+    if (!served_.lamp) {
+      return BadInput("the station has no lamp", "light.driver", "name it in the station file");
+    }
+    double level = served_.level;
+    if (params.contains("level")) {
+      level = params.at("level").get<double>();
+    } else if (!params.at("on").get<bool>()) {
+      level = 0;
+    }
+    const std::lock_guard lock(mutex_);
+    if (holder_ && holder_ != client) {
+      return BadInput("another client has switched the light on", "light",
+                      "wait until it has ended");
+    }
+    SCAN_CHECK(served_.lamp->SetLevel(level));
+    holder_ = level > 0 ? client : nullptr;
+    return Json{{"level", level}, {"settle_ms", level > 0 ? served_.settle_ms : 0}};
+  }
+
+  // Law: who switched it on has gone, so it goes dark.
+  void Leave(const void* client) {
+    const std::lock_guard lock(mutex_);
+    if (holder_ != client) return;
+    holder_ = nullptr;
+    const Status dark = served_.lamp->SetLevel(0);
+    Log(dark ? LogLevel::info : LogLevel::error, "light_off",
+        {{"cause", "its client has gone"}, {"error", dark ? "" : ToString(dark.error())}});
+  }
+
+ private:
+  const ServedLamp served_;
+  std::mutex mutex_;
+  const void* holder_ = nullptr;
+};
+
+// One connection's right to the lamp; ends with it.
+class LampClient {
+ public:
+  explicit LampClient(std::shared_ptr<LampDesk> desk) : desk_(std::move(desk)) {}
+  ~LampClient() { desk_->Leave(this); }
+  LampClient(const LampClient&) = delete;
+  LampClient& operator=(const LampClient&) = delete;
+  Result<Json> Set(const Json& params) { return desk_->Set(this, params); }
+
+ private:
+  std::shared_ptr<LampDesk> desk_;
+};
+
 }  // namespace
 
 RpcFunctions MotionFunctions(Motion& motion) {
@@ -70,12 +124,20 @@ void ServeMotion(Channel& channel, Motion& motion, std::stop_token stop) {
 }
 
 Result<std::unique_ptr<RpcServer>> ListenForMotion(const std::filesystem::path& socket,
-                                                   Motion& motion, const StationIdentity& station) {
+                                                   Motion& motion, const StationIdentity& station,
+                                                   const ServedLamp& lamp) {
   RpcFunctions functions = MotionFunctions(motion);
   functions["describe"] = {[station](const Json&, std::stop_token) -> Result<Json> {
     return Json{{"station", station.name}, {"config_sha256", station.config_sha256}};
   }};
-  return RpcServer::Start(socket, std::move(functions), kHeartbeatLimit, OnPeerLost(motion));
+  auto connect = [functions, desk = std::make_shared<LampDesk>(lamp)] {
+    RpcFunctions own = functions;
+    own["set_light"] = {[client = std::make_shared<LampClient>(desk)](
+                            const Json& params, std::stop_token) { return client->Set(params); }};
+    return own;
+  };
+  return RpcServer::Start(socket, std::function<RpcFunctions()>(std::move(connect)),
+                          kHeartbeatLimit, OnPeerLost(motion));
 }
 
 }  // namespace scan

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "drivers/io/lamp.h"
 #include "drivers/motion/motion.h"
 #include "firmware-host/protocol/rpc_server.h"
 
@@ -28,9 +29,18 @@ struct StationIdentity {
   std::string config_sha256;  // of the file's bytes
 };
 
-// Listens on a Unix socket for many peers; `describe` answers with the station. Precondition:
-// `motion` outlives the server. Errors: as RpcServer::Start.
+// The station's lamp, and what "on" means.
+struct ServedLamp {
+  Lamp* lamp = nullptr;  // null: the station has none
+  double level = 1;
+  double settle_ms = 0;
+};
+
+// Listens on a Unix socket for many peers; `describe` answers with the station. The lamp belongs to
+// the client that switched it on until it switches it off, or has gone or fallen silent: then it
+// goes dark. Preconditions: `motion` and the lamp outlive the server. Errors: as RpcServer::Start.
 Result<std::unique_ptr<RpcServer>> ListenForMotion(const std::filesystem::path& socket,
-                                                   Motion& motion, const StationIdentity& station);
+                                                   Motion& motion, const StationIdentity& station,
+                                                   const ServedLamp& lamp = {});
 
 }  // namespace scan

@@ -183,10 +183,19 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::filesystem::path&
                                                     RpcFunctions functions,
                                                     std::chrono::milliseconds silence_limit,
                                                     std::function<void()> on_lost) {
+  return Start(
+      path, [functions = std::move(functions)] { return functions; }, silence_limit,
+      std::move(on_lost));
+}
+
+Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::filesystem::path& path,
+                                                    std::function<RpcFunctions()> connect,
+                                                    std::chrono::milliseconds silence_limit,
+                                                    std::function<void()> on_lost) {
   std::unique_ptr<RpcServer> server(new RpcServer);
   SCAN_TRY(server->listener_, ListenUnix(path));
   server->path_ = path;
-  server->functions_ = std::move(functions);
+  server->connect_ = std::move(connect);
   server->silence_limit_ = silence_limit;
   server->on_lost_ = std::move(on_lost);
   server->acceptor_ =
@@ -216,7 +225,10 @@ void RpcServer::AcceptLoop(std::stop_token stop) {
     if (!fd || connections_.size() >= kMaxConnections) continue;
     Connection& connection = connections_.emplace_back(std::move(fd));
     connection.thread = std::jthread([this, &connection](std::stop_token connection_stop) {
-      ServeConnection(connection.channel, functions_, silence_limit_, connection_stop, on_lost_);
+      {
+        const RpcFunctions functions = connect_();
+        ServeConnection(connection.channel, functions, silence_limit_, connection_stop, on_lost_);
+      }
       connection.channel.Close();
       const std::lock_guard lock(mutex_);
       connection.ended = true;

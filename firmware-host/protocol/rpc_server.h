@@ -23,6 +23,12 @@ class RpcServer {
                                                   RpcFunctions functions,
                                                   std::chrono::milliseconds silence_limit,
                                                   std::function<void()> on_lost = {});
+  // The same where every connection has functions of its own: `connect` makes them, and they go
+  // when the connection has ended. Thread contract: `connect` is called by the threads that serve.
+  static Result<std::unique_ptr<RpcServer>> Start(const std::filesystem::path& path,
+                                                  std::function<RpcFunctions()> connect,
+                                                  std::chrono::milliseconds silence_limit,
+                                                  std::function<void()> on_lost = {});
   ~RpcServer();  // ends all connections, removes the socket file
 
  private:
@@ -39,7 +45,7 @@ class RpcServer {
 
   std::filesystem::path path_;
   UniqueFd listener_;
-  RpcFunctions functions_;
+  std::function<RpcFunctions()> connect_;
   std::chrono::milliseconds silence_limit_{0};
   std::function<void()> on_lost_;
   std::mutex mutex_;

@@ -1,4 +1,4 @@
-#include "drivers/motion/gpio/gpio_motion_config.h"
+#include "drivers/io/gpio/gpio_pin.h"
 
 #include <fmt/format.h>
 

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "drivers/base/log.h"
 #include "drivers/motion/gpio/gpio_step_port.h"
 #include "drivers/motion/gpio/input_watch.h"
+#include "drivers/motion/power_readback.h"
 #include "drivers/motion/real_time_motion.h"
 #include "drivers/motion/stepper_motion.h"
 
@@ -32,8 +34,9 @@ class NamedAims final : public AimPreset {
 // Keeps the watch from speaking to a motion that has gone.
 class WatchedMotion final : public Motion {
  public:
-  WatchedMotion(std::shared_ptr<InputWatch> watch, std::unique_ptr<Motion> inner)
-      : inner_(std::move(inner)), watch_(std::move(watch)) {}
+  WatchedMotion(std::shared_ptr<InputWatch> watch, std::unique_ptr<PowerReadback> readback,
+                std::unique_ptr<Motion> inner)
+      : inner_(std::move(inner)), readback_(std::move(readback)), watch_(std::move(watch)) {}
   Result<HomeReport> Home(std::stop_token stop) override { return inner_->Home(stop); }
   Result<MoveReport> MoveTo(const StageTarget& target, std::stop_token stop) override {
     return inner_->MoveTo(target, stop);
@@ -47,6 +50,7 @@ class WatchedMotion final : public Motion {
 
  private:
   std::unique_ptr<Motion> inner_;
+  std::unique_ptr<PowerReadback> readback_;
   std::shared_ptr<InputWatch> watch_;
 };
 
@@ -82,6 +86,11 @@ struct Inputs {
   }
 };
 
+std::unique_ptr<StepPort> Wrapped(const StepPortWrap& wrap, const std::string& axis,
+                                  std::unique_ptr<StepPort> port) {
+  return wrap ? wrap(axis, std::move(port)) : std::move(port);
+}
+
 Status CheckSwitch(const AxisConfig& axis, const GpioAxisWiring& wiring) {
   const bool endstop = axis.homing.kind == HomingKind::endstop;
   if (endstop ? wiring.endstop : wiring.index) return {};
@@ -100,12 +109,18 @@ Result<std::unique_ptr<Motion>> MakeGpioMotion(const GpioMotionParts& parts, con
   Inputs inputs;
   const auto estop = inputs.Add("emergency stop", gpio.emergency_stop);
   const auto cover = inputs.Add("cover", gpio.cover);
+  // Watched for its absence, so that a line that fails counts as a supply that is gone.
+  GpioPin no_power = gpio.motor_power;
+  no_power.active_low = !no_power.active_low;
+  const auto power_off = inputs.Add("motor power", no_power);
   GpioStepPort::Switches turntable, lift;
   turntable.endstop = inputs.Add("turntable endstop", gpio.turntable.endstop);
   turntable.index = inputs.Add("turntable index", gpio.turntable.index);
   lift.endstop = inputs.Add("lift endstop", gpio.lift.endstop);
   lift.index = inputs.Add("lift index", gpio.lift.index);
-  SCAN_TRY(auto started, InputWatch::Start(open, gpio.chip, inputs.all));
+  // News of a switch must not wait for other programs, nor keep a step from being on time.
+  const int priority = gpio.real_time.priority > 0 ? std::max(1, gpio.real_time.priority - 1) : 0;
+  SCAN_TRY(auto started, InputWatch::Start(open, gpio.chip, inputs.all, priority));
   const std::shared_ptr<InputWatch> watch = std::move(started);
   turntable.watch = lift.watch = watch;
 
@@ -115,17 +130,32 @@ Result<std::unique_ptr<Motion>> MakeGpioMotion(const GpioMotionParts& parts, con
            GpioStepPort::Open(open, gpio.chip, parts.lift.name, gpio.lift, lift, clock));
   StepperMotion::Parts motion_parts;
   motion_parts.clock = clock;
-  motion_parts.turntable = std::make_unique<Axis>(parts.turntable, std::move(turntable_port));
-  motion_parts.lift = std::make_unique<Axis>(parts.lift, std::move(lift_port));
+  motion_parts.turntable = std::make_unique<Axis>(
+      parts.turntable, Wrapped(parts.wrap, parts.turntable.name, std::move(turntable_port)));
+  motion_parts.lift = std::make_unique<Axis>(
+      parts.lift, Wrapped(parts.wrap, parts.lift.name, std::move(lift_port)));
   motion_parts.aim = std::make_unique<NamedAims>(parts.aim_ids);
   motion_parts.on_end = LogRecord;
   auto motion = std::make_unique<StepperMotion>(std::move(motion_parts));
-  watch->Listen([raw = motion.get(), estop, cover](std::size_t input, bool active) {
-    if (input == estop) raw->SetInterlock(Interlock::emergency_stop, active);
+  auto readback =
+      std::make_unique<PowerReadback>(std::llround(gpio.power_off_ms * 1e6), power_off.has_value(),
+                                      [raw = motion.get()](bool present) {
+                                        raw->SetInterlock(Interlock::motor_power_not_cut, present);
+                                      });
+  watch->Listen([raw = motion.get(), power = readback.get(), estop, cover, power_off](
+                    std::size_t input, bool active) {
+    if (input == estop) {
+      raw->SetInterlock(Interlock::emergency_stop, active);
+      power->OnEmergencyStop(active);
+    }
     if (input == cover) raw->SetInterlock(Interlock::cover_open, active);
+    if (input == power_off) {
+      raw->SetInterlock(Interlock::motor_power_off, active);
+      power->OnPower(!active);
+    }
   });
   auto real_time = std::make_unique<RealTimeMotion>(std::move(motion), gpio.real_time, LogGrant);
-  return std::make_unique<WatchedMotion>(watch, std::move(real_time));
+  return std::make_unique<WatchedMotion>(watch, std::move(readback), std::move(real_time));
 }
 
 }  // namespace scan

@@ -10,6 +10,7 @@
 #include "drivers/motion/axis_config.h"
 #include "drivers/motion/gpio/gpio_motion_config.h"
 #include "drivers/motion/motion.h"
+#include "drivers/motion/step_port.h"
 
 namespace scan {
 
@@ -17,6 +18,7 @@ struct GpioMotionParts {
   AxisConfig turntable, lift;
   GpioMotionConfig gpio;
   std::vector<std::string> aim_ids;  // known by name; the camera is aimed by hand or not at all
+  StepPortWrap wrap = {};            // of every axis' port; may be empty
 };
 
 // Takes the lines, watches the switches, and plays moves on a real-time thread. Logs what the

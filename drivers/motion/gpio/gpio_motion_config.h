@@ -2,26 +2,11 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
-#include "drivers/base/result.h"
-#include "drivers/io/gpio/gpio_lines.h"
+#include "drivers/io/gpio/gpio_pin.h"
 #include "drivers/motion/real_time.h"
 
 namespace scan {
-
-// A line and its sense, written "GPIO17", "!GPIO27" (active low), "^GPIO22" (pull-up),
-// "~GPIO22" (pull-down), "^!GPIO22" (both); empty: there is none.
-struct GpioPin {
-  std::string name;
-  bool active_low = false;
-  GpioBias bias = GpioBias::as_is;
-  explicit operator bool() const { return !name.empty(); }
-  friend bool operator==(const GpioPin&, const GpioPin&) = default;
-};
-
-// Errors: bad_input for marks without a name, or marks twice.
-Result<GpioPin> ParseGpioPin(std::string_view text);
 
 struct GpioAxisWiring {
   GpioPin step, direction;  // a step on the active edge; active direction counts up
@@ -39,6 +24,8 @@ struct GpioMotionConfig {
   GpioPin emergency_stop;  // active: power is cut; a normally closed contact with a pull-up also
                            // reads so when its wire breaks
   GpioPin cover;           // active: open
+  GpioPin motor_power;  // active: the motors' supply is there, behind the emergency stop's contact
+  double power_off_ms = 500;  // an emergency stop must have cut it within this
   RealTimeOptions real_time;
   GpioAxisWiring turntable, lift;
   friend bool operator==(const GpioMotionConfig&, const GpioMotionConfig&) = default;

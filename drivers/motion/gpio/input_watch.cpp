@@ -11,7 +11,7 @@ namespace scan {
 
 Result<std::unique_ptr<InputWatch>> InputWatch::Start(const GpioOpener& open,
                                                       const std::string& chip,
-                                                      std::vector<Input> inputs) {
+                                                      std::vector<Input> inputs, int priority) {
   std::unique_ptr<InputWatch> watch(new InputWatch);
   watch->inputs_ = std::move(inputs);
   watch->states_ = std::make_unique<State[]>(watch->inputs_.size());
@@ -27,7 +27,8 @@ Result<std::unique_ptr<InputWatch>> InputWatch::Start(const GpioOpener& open,
   if (!watch->wake_) {
     return Failed("no more descriptors", "gpio inputs", "close other programs");
   }
-  watch->thread_ = std::jthread([raw = watch.get()](std::stop_token stop) { raw->Run(stop); });
+  watch->thread_ = std::jthread(
+      [raw = watch.get(), priority](std::stop_token stop) { raw->Run(stop, priority); });
   return watch;
 }
 
@@ -68,7 +69,14 @@ void InputWatch::Deafen() {
   listener_ = nullptr;
 }
 
-void InputWatch::Run(std::stop_token stop) {
+void InputWatch::Run(std::stop_token stop, int priority) {
+  const RealTimeGrant grant = BecomeRealTime({priority, std::nullopt});
+  if (priority > 0 && !grant.fifo) {
+    Log(LogLevel::warning, "inputs_real_time",
+        {{"fifo", "no"},
+         {"effect", "news of a switch may come late on a busy machine"},
+         {"mend", grant.mend}});
+  }
   for (;;) {
     auto edge = lines_->WaitEdge(-1, wake_.get());
     if (stop.stop_requested()) return;

@@ -34,9 +34,10 @@ class InputWatch {
   // Told of every change, on the watching thread; `active` is also true when the line has failed.
   using Listener = std::function<void(std::size_t input, bool active)>;
 
-  // Errors: as the opener's.
+  // `priority` of the watching thread (SCHED_FIFO; 0: an ordinary one) stays below that of the
+  // thread that steps; where it is not permitted the log says so. Errors: as the opener's.
   static Result<std::unique_ptr<InputWatch>> Start(const GpioOpener& open, const std::string& chip,
-                                                   std::vector<Input> inputs);
+                                                   std::vector<Input> inputs, int priority = 0);
   ~InputWatch();
 
   // Inputs by their place. Errors: device, when it bounces or its line has failed.
@@ -55,7 +56,7 @@ class InputWatch {
     std::size_t edges = 0;
   };
   InputWatch() = default;
-  void Run(std::stop_token stop);
+  void Run(std::stop_token stop, int priority);
   void Follow(const GpioEdge& edge);
   Status ReadAgain();
   void Change(std::size_t input, bool active);

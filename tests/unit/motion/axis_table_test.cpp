@@ -13,9 +13,10 @@ constexpr AxisCommand kCommands[] = {AxisCommand::home,    AxisCommand::move,
 constexpr AxisEvent kEvents[] = {AxisEvent::powered, AxisEvent::released, AxisEvent::motion_started,
                                  AxisEvent::homed,   AxisEvent::arrived,  AxisEvent::stopped,
                                  AxisEvent::aborted, AxisEvent::faulted,  AxisEvent::acknowledged};
-constexpr Interlock kAllInterlocks[] = {Interlock::cover_open, Interlock::heartbeat_lost,
-                                        Interlock::limit_switch, Interlock::late_step,
-                                        Interlock::emergency_stop};
+constexpr Interlock kAllInterlocks[] = {Interlock::cover_open,         Interlock::heartbeat_lost,
+                                        Interlock::limit_switch,       Interlock::late_step,
+                                        Interlock::emergency_stop,     Interlock::motor_power_off,
+                                        Interlock::motor_power_not_cut};
 
 TEST(AxisTable, RowsStandInTheOrderOfTheirStates) {
   static_assert(std::size(kStates) == kAxisStates && std::size(kCommands) == kAxisCommands &&

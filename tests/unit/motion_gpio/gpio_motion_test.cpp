@@ -71,7 +71,8 @@ struct Bench {
   }
   std::shared_ptr<SimGpioBoard> board = std::make_shared<SimGpioBoard>(
       "board",
-      std::vector<std::string>{"TS", "TD", "TE", "LS", "LD", "LE", "INDEX", "ENDSTOP", "ESTOP"},
+      std::vector<std::string>{"TS", "TD", "TE", "LS", "LD", "LE", "INDEX", "ENDSTOP", "ESTOP",
+                               "POWER", "COVER"},
       std::make_shared<SystemClock>());
   GpioMotionParts parts;
   bool level[6] = {};
@@ -139,6 +140,94 @@ TEST(GpioMotion, PressedFromTheStartItPermitsNothing) {
   ASSERT_FALSE(homed);
   EXPECT_EQ(homed.error().kind, ErrorKind::device);
   EXPECT_EQ(bench.edges, 0);
+}
+
+// A bench whose motors' supply is read back: POWER is high while it is there.
+struct PowerBench : Bench {
+  PowerBench() {
+    parts.gpio.motor_power = {"POWER"};
+    parts.gpio.power_off_ms = 1;
+    board->Drive("POWER", true);
+  }
+  // Until the watching threads have seen what was done to the lines.
+  static void Until(Motion& motion, const std::string& interlocks) {
+    while (motion.ReadStatus().interlocks != interlocks) SystemClock().SleepFor(100'000);
+  }
+};
+
+TEST(GpioMotion, ASupplyThatTheEmergencyStopDoesNotCutIsAFault) {
+  PowerBench bench;
+  const auto motion = bench.Make();
+  ASSERT_TRUE(motion);
+  ASSERT_TRUE(motion->Home({}));
+  bench.board->Drive("ESTOP", true);
+  PowerBench::Until(*motion, "emergency stop, motor power not cut by the emergency stop");
+  EXPECT_EQ(motion->ReadStatus().alarm, Alarm::invalid);
+  EXPECT_THAT(motion->ReadStatus().fault, HasSubstr("not cut"));
+  bench.board->Drive("ESTOP", false);
+  while (motion->ReadStatus().alarm != Alarm::none) {
+    ASSERT_TRUE(motion->Acknowledge());
+    SystemClock().SleepFor(100'000);
+  }
+  ASSERT_TRUE(motion->Home({}));
+}
+
+TEST(GpioMotion, ASupplyThatGoesEndsTheMoveAndNeedsHoming) {
+  PowerBench bench;
+  const auto motion = bench.Make();
+  ASSERT_TRUE(motion);
+  ASSERT_TRUE(motion->Home({}));
+  std::thread unplugger([&] {
+    const std::int64_t from = bench.edges;
+    while (bench.edges - from < 100) SystemClock().SleepFor(100'000);
+    bench.board->Drive("POWER", false);
+  });
+  const auto moved = motion->MoveTo({500, 0, "a0"}, {});
+  unplugger.join();
+  ASSERT_FALSE(moved);
+  EXPECT_THAT(moved.error().what, HasSubstr("motor power off"));
+  EXPECT_FALSE(motion->Home({})) << "there is no supply";
+  bench.board->Drive("POWER", true);
+  while (motion->ReadStatus().alarm != Alarm::none) {
+    ASSERT_TRUE(motion->Acknowledge());
+    SystemClock().SleepFor(100'000);
+  }
+  EXPECT_FALSE(motion->MoveTo({0, 0, "a0"}, {})) << "not homed";
+  bench.position[kTurnStep] = -60;
+  ASSERT_TRUE(motion->Home({}));
+}
+
+TEST(GpioMotion, AnEmergencyStopThatCutsTheSupplyIsNoFaultOfItsOwn) {
+  PowerBench bench;
+  bench.parts.gpio.power_off_ms = 10'000;
+  const auto motion = bench.Make();
+  ASSERT_TRUE(motion);
+  ASSERT_TRUE(motion->Home({}));
+  bench.board->Drive("ESTOP", true);
+  bench.board->Drive("POWER", false);
+  PowerBench::Until(*motion, "emergency stop, motor power off");
+  EXPECT_EQ(motion->ReadStatus().fault, "emergency stop");
+}
+
+TEST(GpioMotion, AnOpenCoverStopsAMoveAndForbidsTheNext) {
+  Bench bench;
+  bench.parts.gpio.cover = {"COVER"};
+  const auto motion = bench.Make();
+  ASSERT_TRUE(motion);
+  ASSERT_TRUE(motion->Home({}));
+  std::thread opener([&] {
+    const std::int64_t from = bench.edges;
+    while (bench.edges - from < 100) SystemClock().SleepFor(100'000);
+    bench.board->Drive("COVER", true);
+  });
+  const auto moved = motion->MoveTo({500, 0, "a0"}, {});
+  opener.join();
+  ASSERT_FALSE(moved);
+  EXPECT_THAT(moved.error().what, HasSubstr("cover open"));
+  EXPECT_FALSE(motion->MoveTo({0, 0, "a0"}, {}));
+  bench.board->Drive("COVER", false);
+  PowerBench::Until(*motion, "");
+  EXPECT_TRUE(motion->MoveTo({0, 0, "a0"}, {})) << "the position was kept";
 }
 
 TEST(GpioMotion, ALineThatIsMissingOrTakenIsNamed) {

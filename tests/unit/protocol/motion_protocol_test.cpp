@@ -144,6 +144,76 @@ TEST(MotionProtocol, OnlyTheLossOfTheClientThatMovesStopsTheMotion) {
   EXPECT_EQ(motion.lost, 1);
 }
 
+// Remembers what it was asked for.
+class NotedLamp final : public Lamp {
+ public:
+  Status SetLevel(double asked) override {
+    if (broken) return DeviceFault("burnt out", "lamp", "change it");
+    level = asked;
+    return {};
+  }
+  std::atomic<double> level = 0;
+  std::atomic<bool> broken = false;
+};
+
+struct LitStation {
+  LitStation() {
+    server = std::move(*ListenForMotion(socket, motion, {"lab", "0123"}, {&lamp, 0.75, 0}));
+  }
+  std::unique_ptr<MotionClient> Connect() {
+    return std::make_unique<MotionClient>(std::move(*ConnectUnix(socket)));
+  }
+  TempFolder folder;
+  std::filesystem::path socket = folder.path() / "motion";
+  EndlessMotion motion;
+  NotedLamp lamp;
+  std::unique_ptr<RpcServer> server;
+};
+
+TEST(MotionProtocol, OnIsTheLevelOfTheStationFileAndFaultsArrive) {
+  LitStation station;
+  const auto client = station.Connect();
+  const auto light = client->MakeLight(std::make_shared<SystemClock>());
+  for (const bool on : {true, true, false, false, true}) {
+    const Status set = light->Set(on);
+    ASSERT_TRUE(set) << ToString(set.error());
+    EXPECT_EQ(station.lamp.level, on ? 0.75 : 0);
+  }
+  ASSERT_TRUE(client->SetLightLevel(0.5));
+  EXPECT_EQ(station.lamp.level, 0.5);
+  station.lamp.broken = true;
+  EXPECT_EQ(light->Set(false).error().what, "burnt out");
+}
+
+TEST(MotionProtocol, TheLampBelongsToWhoSwitchedItOnUntilThatOneHasGone) {
+  LitStation station;
+  auto client = station.Connect();
+  const auto other = station.Connect();
+  ASSERT_TRUE(client->SetLightLevel(1));
+  EXPECT_EQ(other->SetLightLevel(0).error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(station.lamp.level, 1);
+  client.reset();
+  while (station.lamp.level > 0) std::this_thread::yield();
+  EXPECT_TRUE(other->SetLightLevel(0.25));
+  EXPECT_EQ(station.lamp.level, 0.25);
+}
+
+TEST(MotionProtocol, AClientThatFallsSilentLeavesTheLampDark) {
+  LitStation station;
+  Channel silent(std::move(*ConnectUnix(station.socket)));
+  ASSERT_TRUE(silent.Send({{"id", 1}, {"call", "set_light"}, {"params", {{"on", true}}}}));
+  while (station.lamp.level == 0) std::this_thread::yield();
+  while (station.lamp.level > 0) std::this_thread::yield();  // no heartbeat
+}
+
+TEST(MotionProtocol, AStationWithoutALampSaysSo) {
+  TempFolder folder;
+  EndlessMotion motion;
+  const auto server = ListenForMotion(folder.path() / "motion", motion, {"lab", "0123"});
+  MotionClient client(std::move(*ConnectUnix(folder.path() / "motion")));
+  EXPECT_EQ(client.SetLightLevel(1).error().kind, ErrorKind::bad_input);
+}
+
 TEST(MotionProtocol, MalformedMessagesNameTheField) {
   EXPECT_EQ(StageTargetFromJson(Json{{"lift_mm", 3}}).error().kind, ErrorKind::bad_input);
   EXPECT_FALSE(MotionStatusFromJson(Json(3)));

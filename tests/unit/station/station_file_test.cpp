@@ -66,6 +66,7 @@ TEST(StationFile, EveryKeyIsReadAndEveryOneIsCommented) {
   EXPECT_GT(CountKeysThatAreRead(DefaultFile()), 90);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-uvc.toml")), 18);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-tic-uvc.toml")), 40);
+  EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-rpi5.toml")), 60);
 }
 
 TEST(StationFile, AUsbCameraHasItsPortFormatAndControls) {
@@ -130,6 +131,10 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"[sim.errors]\nlevel = 'none'", "none of its words", "s.toml:2"},
         BadCase{"[motion]\ndriver = 'gpio'", "no step line", "s.toml:1"},
         BadCase{"[motion]\nemergency_stop = '!'", "is no line", "s.toml:2"},
+        BadCase{"[light]\ndriver = 'gpio'", "no line", "s.toml:1"},
+        BadCase{"[light]\ndriver = 'gpio'\nline = 'L'\nlevel = 0.5", "on or off", "s.toml:4"},
+        BadCase{"[light]\ndriver = 'pwm'", "no PWM chip", "s.toml:1"},
+        BadCase{"[light]\nlevel = 0", "out of range", "s.toml:2"},
         BadCase{"[motion]\npriority = 100", "out of range", "s.toml:2"},
         BadCase{"[axis.lift.gpio]\nstep = 4", "is not a text", "s.toml:2"},
         BadCase{"[axis.lift.gpio]\nsteps = 'A'", "unknown key axis.lift.gpio.steps", "s.toml:2"},
@@ -148,6 +153,9 @@ TEST(StationFile, TheStationsOfRealLinesAreValidAndReadWhole) {
   ASSERT_TRUE(pi) << ToString(pi.error());
   EXPECT_EQ(pi->gpio.chip, "pinctrl-rp1");
   EXPECT_EQ(pi->gpio.emergency_stop.bias, GpioBias::pull_up);
+  EXPECT_EQ(pi->gpio.motor_power, (GpioPin{"GPIO16", true, GpioBias::pull_up}));
+  EXPECT_EQ(pi->light.driver, LightDriver::pwm);
+  EXPECT_EQ(pi->light.chip, "1f00098000.pwm");
   EXPECT_EQ(pi->gpio.real_time.core, 3);
 }
 
@@ -163,6 +171,25 @@ TEST(StationFile, AWiringMustFitTheAxis) {
   EXPECT_THAT(refusal("index = \"TURNTABLE_INDEX\"", ""), HasSubstr("no line"));
   EXPECT_THAT(refusal("pulse_us = 3.0", "pulse_us = 300.0"), HasSubstr("full velocity"));
   EXPECT_EQ(refusal("core = -1", "core = 1"), "");
+}
+
+TEST(StationFile, ATmc2209MustBeSetUpAsItCanBe) {
+  const std::string pi = ReadTextFile(SCAN_SOURCE_DIR "/configs/station-rpi5.toml").value();
+  const auto read = ParseStationConfig(pi, "pi");
+  ASSERT_TRUE(read) << ToString(read.error());
+  EXPECT_EQ(read->lift_tmc2209.address, 1);
+  EXPECT_EQ(read->turntable_tmc2209.run_ma, 800);
+  const std::pair<const char*, const char*> cases[] = {{"microsteps = 16", "microsteps = 12"},
+                                                       {"run_ma = 800.0", "run_ma = 2500.0"},
+                                                       {"hold_ma = 400.0", "hold_ma = 900.0"},
+                                                       {"address = 1", "address = 0"}};
+  for (const auto& [from, to] : cases) {
+    std::string broken = pi;
+    broken.replace(broken.find(from), std::string_view(from).size(), to);
+    const auto refused = ParseStationConfig(broken, "pi");
+    ASSERT_FALSE(refused) << to;
+    EXPECT_THAT(refused.error().what, HasSubstr("tmc2209"));
+  }
 }
 
 TEST(StationFile, ATicStationIsReadWhole) {
