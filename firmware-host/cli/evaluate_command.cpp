@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -71,6 +72,7 @@ Json ToJson(const MethodFigures& figures, double wrong_px) {
                      {"cost_px", v.cost_px},
                      {"cost_l1_px", v.cost_l1_px},
                      {"nees", v.nees},
+                     {"centre_sigma_mm", v.centre_sigma_mm},
                      {"error", ToJson(v.error)},
                      {"error_up_to_free_turn", ToJson(v.turned)}});
   return {{"views", s.views},
@@ -84,6 +86,8 @@ Json ToJson(const MethodFigures& figures, double wrong_px) {
           {"centre_as_found_mm", ToJson(s.centre_raw_mm)},
           {"surface_as_found_px", ToJson(s.surface_raw_px)},
           {"mean_nees", s.mean_nees},
+          {"centre_rms_mm", s.centre_rms_mm},
+          {"centre_rms_per_reported_sigma", s.centre_per_sigma},
           {"seconds", figures.seconds},
           {"free_directions", free},
           {"per_view", views}};
@@ -175,16 +179,16 @@ Result<PoseTrial> CapturedTrial(const fs::path& folder, const EvaluateOptions& o
   return TrialOf(paths, options, context);
 }
 
+int WidthOf(const EvaluateOptions& options) { return options.full_size ? 3696 : options.fig12.w; }
+
 // The paper renders its photographs from the mesh that it then searches; so does this (but for
 // --paper-faces).
 Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
   SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
   Fig12Options fig12 = options.fig12;
   if (options.views > 0) fig12.cameras = static_cast<int>(options.views);
-  if (options.full_size) {
-    fig12.w *= 8;
-    fig12.h *= 8;
-  }
+  fig12.w = WidthOf(options);
+  fig12.h = static_cast<int>(std::lround(fig12.w * 2448.0 / 3696));
   return MakeFig12Trial(ExactSurface(*specimen, 0.35), fig12);
 }
 
@@ -200,6 +204,13 @@ Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& co
   return trial;
 }
 
+// The bars of the protocol.
+std::string WithinText(const MethodFigures& figures) {
+  return fmt::format("{}: within 5 mm and 1 deg {}, within 15 mm and 1.5 deg {} of {}\n",
+                     figures.method, CountWithin(figures, 5, 1), CountWithin(figures, 15, 1.5),
+                     figures.views.size());
+}
+
 std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial) {
   const Intrinsics& in = trial.photos.intrinsics(trial.photos.photos.front());
   const std::string where =
@@ -207,6 +218,11 @@ std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial)
                          : fmt::format("simulated station, {} errors", options.errors);
   std::string text = fmt::format("{}: {} photographs of {} x {}, {}\n", options.specimen,
                                  trial.photos.photos.size(), in.w, in.h, where);
+  const ContourNoise& noise = options.fig12.noise;
+  if (options.is_fig12() && (noise.displaces() || noise.binary))
+    text += fmt::format("outlines stray by {:g} px (correlation {:g} px), swell by {:g} px{}\n",
+                        noise.sigma_px, noise.correlation_px, noise.bias_px,
+                        noise.binary ? ", binary masks" : "");
   if (options.with_paper())
     text += fmt::format(
         "paper: {} directions x {} distances x {} angles, {} chains x {} steps, gate {}, mesh of "
@@ -223,21 +239,30 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
     options.model.model = options.what;
     return EvaluateModel(options.model, context);
   }
-  // The protocol's masks are exact: no bias is looked for.
-  if (options.is_fig12()) options.joint.rig.mask_bias_px = 0.02;
+  if (options.is_fig12()) {
+    // Exact masks: no bias is looked for.
+    if (options.fig12.noise.bias_px == 0) options.joint.rig.mask_bias_px = 0.02;
+    // The mesh is the truth: residuals hang together as far as the masks' errors do, and no more.
+    constexpr double kLeastCorrelationPx = 2;
+    if (options.fig12.noise.sigma_px > 0)
+      options.joint.refine.correlation_floor_px = kLeastCorrelationPx * 1848 / WidthOf(options);
+  }
   SCAN_TRY(const PoseTrial trial, MakeTrial(options, context));
   SCAN_TRY(const auto methods, RunMethods(trial, options, context));
   Json by_method = Json::object();
   for (const MethodFigures& method : methods)
     by_method[method.method] = ToJson(method, options.wrong_px);
-  return CommandOutput{
-      {{"specimen", options.specimen},
-       {"preset", options.preset},
-       {"errors", options.is_fig12() ? Json() : Json(options.errors)},
-       {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
-       {"photographs", trial.photos.photos.size()},
-       {"methods", by_method}},
-      ProtocolText(options, trial) + TableOf(methods, options.wrong_px, options.per_view)};
+  std::string text = ProtocolText(options, trial);
+  text += TableOf(methods, options.wrong_px, options.per_view);
+  if (options.is_fig12())
+    for (const MethodFigures& method : methods) text += WithinText(method);
+  return CommandOutput{{{"specimen", options.specimen},
+                        {"preset", options.preset},
+                        {"errors", options.is_fig12() ? Json() : Json(options.errors)},
+                        {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
+                        {"photographs", trial.photos.photos.size()},
+                        {"methods", by_method}},
+                       text};
 }
 
 }  // namespace
@@ -272,7 +297,23 @@ void AddEvaluate(CommandSet& commands) {
   command.add_option("--focal-mm", options->fig12.focal_mm, "fig12: of a sensor 23.6 mm wide")
       ->check(CLI::Range(10.0, 1000.0))
       ->capture_default_str();
+  command.add_option("--width", options->fig12.w, "fig12: of the photographs, px")
+      ->check(CLI::Range(120, 8000))
+      ->capture_default_str();
   command.add_flag("--full-size", options->full_size, "fig12: 3696 x 2448 instead of 462 x 306");
+  ContourNoise& noise = options->fig12.noise;
+  command.add_option("--noise-px", noise.sigma_px, "fig12: sigma by which the outlines stray")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  command
+      .add_option("--noise-length-px", noise.correlation_px,
+                  "fig12: integral of the noise's autocorrelation along the outline")
+      ->check(CLI::Range(0.5, 1000.0))
+      ->capture_default_str();
+  command.add_option("--bias-px", noise.bias_px, "fig12: by which the masks swell")
+      ->check(CLI::Range(-100.0, 100.0))
+      ->capture_default_str();
+  command.add_flag("--binary", noise.binary, "fig12: masks of whole pixels");
   command.add_option("--seed", options->fig12.seed, "fig12: of the cameras")->capture_default_str();
   command.add_option("--errors", options->errors, "of the simulated rig")
       ->check(CLI::IsMember({"ideal", "static", "dynamic"}))

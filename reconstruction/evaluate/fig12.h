@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <stop_token>
+#include <vector>
 
 #include "drivers/base/progress.h"
 #include "drivers/base/result.h"
+#include "reconstruction/evaluate/contour_noise.h"
 #include "reconstruction/evaluate/pose_trial.h"
 
 namespace scan {
@@ -19,10 +21,18 @@ struct Fig12Options {
   double r0_mm = 550;
   int samples = 8;  // squared: points of coverage in each pixel
   std::uint64_t seed = 12;
+  ContourNoise noise;  // of each photograph's mask, independent between them
 };
 
-// Photographs of `mesh` (model frame, mm) as masks of area coverage, without any logged pose, all
-// with the stated focal length and r0. Same bytes for any number of threads.
+// The true outlines in pixels of `intrinsics`, to a few hundredths of one: the contours of a finer
+// picture. Precondition: all of the mesh in front of the camera. Thread contract: pure.
+std::vector<Contour> TrueOutlines(const TriangleMesh& mesh,
+                                  const CameraFromModel& camera_from_model,
+                                  const Intrinsics& intrinsics);
+
+// Photographs of `mesh` (model frame, mm) as masks of area coverage, with the stated errors of
+// their outlines; without any logged pose, all with the stated focal length and r0. Same bytes for
+// any number of threads.
 PoseTrial MakeFig12Trial(const TriangleMesh& mesh, const Fig12Options& options);
 
 // SolveJoint on each photograph alone, nothing shared between them. Poses as if from one call.

@@ -40,6 +40,7 @@ struct ViewFigures {
   PoseError error;                     // as found
   PoseError turned;                    // after the common turn about the free axes, see ScorePoses
   double nees = 0;  // normalised error squared of the reported covariance, 6 degrees of freedom
+  double centre_sigma_mm = 0;  // reported: the root of the trace of the centre's covariance
 };
 
 struct MethodFigures {
@@ -64,8 +65,13 @@ struct MethodSummary {
   Spread centre_mm, rotation_deg, surface_px, cost_px;  // of accepted views, `turned`
   Spread centre_raw_mm, surface_raw_px;                 // of accepted views, as found
   double mean_nees = 0;
+  // RMS of the centre's errors as found, and over that of the reported sigmas.
+  double centre_rms_mm = 0, centre_per_sigma = 0;
 };
 MethodSummary Summarise(const MethodFigures& figures, double wrong_px);
+
+// Views as close as that to the truth as found, accepted or not.
+std::size_t CountWithin(const MethodFigures& figures, double centre_mm, double rotation_deg);
 
 // The lines of a table for a terminal; `per_view` adds one line a view.
 std::string TableOf(std::span<const MethodFigures> methods, double wrong_px, bool per_view);

@@ -83,6 +83,37 @@ TEST(Fig12, TheSeedAloneDecides) {
   EXPECT_GT(cv::norm(one.masks[0].coverage, other.masks[0].coverage, cv::NORM_L1), 0);
 }
 
+TEST(Fig12, OutlinesCarryTheStatedErrors) {
+  const TriangleMesh mesh = test::BugMesh(1);
+  Fig12Options options = Small();
+  options.cameras = 3;
+  options.noise.bias_px = 0.5;
+  const PoseTrial swollen = MakeFig12Trial(mesh, options);
+  options.noise.sigma_px = 0.5;
+  options.noise.binary = true;
+  const PoseTrial strayed = MakeFig12Trial(mesh, options);
+  options.noise = {};
+  const PoseTrial clean = MakeFig12Trial(mesh, options);
+  for (std::size_t i = 0; i < clean.masks.size(); ++i) {
+    const PoseOf& camera = clean.truth[i];
+    double length = 0;
+    const auto outlines = TrueOutlines(mesh, camera.camera_from_model, camera.intrinsics);
+    for (const Contour& contour : outlines) length += LengthOf(contour);
+    EXPECT_LE(cv::norm(CoverageOfContours(outlines, clean.masks[i].coverage.size()),
+                       clean.masks[i].coverage, cv::NORM_INF),
+              24)
+        << "of 255";
+    const double grown =
+        (cv::sum(swollen.masks[i].coverage)[0] - cv::sum(clean.masks[i].coverage)[0]) / 255;
+    EXPECT_NEAR(grown, 0.5 * length, 0.1 * length);
+    EXPECT_FALSE(swollen.masks[i].binary);
+    EXPECT_TRUE(strayed.masks[i].binary);
+    const cv::Mat& pixels = strayed.masks[i].coverage;
+    EXPECT_EQ(cv::countNonZero(pixels), cv::countNonZero(pixels == 255));
+    EXPECT_GT(cv::norm(pixels, swollen.masks[i].coverage, cv::NORM_INF), 100);
+  }
+}
+
 TEST(SolveEachAlone, IsSolveJointOnEveryPhotograph) {
   const TriangleMesh mesh = test::BugMesh(1);
   Fig12Options protocol = Small();

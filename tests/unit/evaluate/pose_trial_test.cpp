@@ -127,6 +127,23 @@ TEST(ScorePoses, NeesIsInUnitsOfTheReportedCovariance) {
   EXPECT_NEAR(ScorePoses(c.trial, c.poses, {}).views[0].nees, 7, 1e-6);
 }
 
+TEST(Summarise, SetsErrorsBesideTheReportedSigmas) {
+  Case c = MakeCase();
+  Vector6d motion = Vector6d::Zero();
+  motion[3] = 3;
+  for (std::size_t i = 0; i < c.poses.views.size(); ++i) {
+    c.trial.truth[i].camera_from_model =
+        MovedAbout(c.poses.views[i].camera_from_model, motion, Eigen::Vector3d::Zero());
+    c.poses.views[i].covariance.diagonal().tail<3>() << 1, 4, 4;
+  }
+  const MethodFigures figures = ScorePoses(c.trial, c.poses, {});
+  const MethodSummary summary = Summarise(figures, 1e6);
+  EXPECT_NEAR(summary.centre_rms_mm, 3, 1e-6);
+  EXPECT_NEAR(summary.centre_per_sigma, 1, 1e-6);
+  EXPECT_EQ(CountWithin(figures, 3.1, 0.1), 4u);
+  EXPECT_EQ(CountWithin(figures, 2.9, 0.1), 0u);
+}
+
 TEST(Subset, KeepsPhotosMasksAndTruthTogether) {
   const Case c = MakeCase();
   const std::vector<std::size_t> indices = EvenlySpread(4, 2);
