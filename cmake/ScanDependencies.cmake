@@ -15,6 +15,7 @@ pkg_check_modules(libexif REQUIRED IMPORTED_TARGET libexif)
 # 1.6 in Debian 12, 2.x in Debian 13: another interface, so each has a file of its own.
 pkg_check_modules(libgpiod REQUIRED IMPORTED_TARGET libgpiod>=1.6)
 string(REGEX MATCH "^[0-9]+" SCAN_GPIOD_MAJOR ${libgpiod_VERSION})
+pkg_check_modules(libcamera REQUIRED IMPORTED_TARGET libcamera)
 pkg_check_modules(libusb REQUIRED IMPORTED_TARGET libusb-1.0)
 pkg_check_modules(HTTPLIB REQUIRED IMPORTED_TARGET cpp-httplib)
 

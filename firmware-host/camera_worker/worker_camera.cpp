@@ -76,6 +76,7 @@ Status WorkerCamera::EnsureConnected(std::stop_token stop) {
                                    info->w, info->h, info_.w, info_.h),
                        options_.id, "check which camera is plugged in");
   info_ = std::move(*info);
+  sequence_base_ = next_sequence_;
   connection_ = std::move(connection);
   if (asked_ == CameraSettings{}) return {};
   if (const auto applied = SendSettings(asked_); !applied) {
@@ -113,6 +114,8 @@ Result<Frame> WorkerCamera::Grab(std::stop_token stop) {
     Result<Frame> frame = UnpackFrame(answer.body, answer.files, options_.limits.max_picture_bytes);
     if (!frame)
       return tl::unexpected(connection_->Lose("answered nonsense: " + ToString(frame.error())));
+    frame->sensor_sequence += sequence_base_;
+    next_sequence_ = frame->sensor_sequence + 1;
     return frame;
   });
 }

@@ -70,6 +70,7 @@ class WorkerCamera final : public Camera {
   CameraSettings asked_;  // everything asked for so far
   std::unique_ptr<WorkerConnection> connection_;
   int restarts_ = 0;
+  std::uint64_t sequence_base_ = 0, next_sequence_ = 0;  // a worker counts anew
 };
 
 // The cameras that a worker program finds. Errors: as the worker's list; device, when it hangs.

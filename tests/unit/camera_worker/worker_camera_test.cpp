@@ -38,8 +38,9 @@ int OpenDescriptors() {
 // open, configure, grab, grab; gives the exposure of the last frame.
 Result<double> UseOnce(WorkerCamera& camera) {
   SCAN_CHECK(camera.Configure({.exposure_us = kExposureUs, .gain = {}}));
-  SCAN_CHECK(camera.Grab({}));
+  SCAN_TRY(const Frame first, camera.Grab({}));
   SCAN_TRY(const Frame frame, camera.Grab({}));
+  EXPECT_GT(frame.sensor_sequence, first.sensor_sequence);
   return frame.applied.exposure_us.value_or(0);
 }
 
