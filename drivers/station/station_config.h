@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/base/result.h"
+#include "drivers/camera/libcamera/libcamera_config.h"
 #include "drivers/camera/v4l2/v4l2_config.h"
 #include "drivers/io/light_config.h"
 #include "drivers/motion/axis_config.h"
@@ -37,13 +38,14 @@ struct LensConfig {
 };
 
 // What gives the pictures.
-enum class CameraDriver { sim, v4l2 };
+enum class CameraDriver { sim, v4l2, libcamera };
 
 struct CameraConfig {
   std::string id = "c0";
   std::string model = "simulated camera";
   CameraDriver driver = CameraDriver::sim;
-  V4l2Config v4l2;  // of the v4l2 driver
+  V4l2Config v4l2;            // of the v4l2 driver
+  LibcameraConfig libcamera;  // of the libcamera driver
   int w = 1848, h = 1224;
   double azimuth_deg = -90;  // where the camera stands, about the turntable axis from station +x
   LensConfig lens;

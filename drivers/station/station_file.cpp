@@ -146,14 +146,29 @@ void ReadV4l2(TomlReader& in, V4l2Config& v4l2) {
   in.Table("controls", [&](TomlReader& controls) { controls.Scalars(v4l2.controls); });
 }
 
+void ReadLibcamera(TomlReader& in, LibcameraConfig& libcamera) {
+  in.Text("camera", libcamera.camera);
+  const char* const roles[] = {"still", "viewfinder", "raw"};
+  if (const auto word = in.Word("role", {"still", "viewfinder", "raw"}))
+    libcamera.role = roles[static_cast<std::size_t>(*word)];
+  in.Text("pixel_format", libcamera.pixel_format);
+  in.Flag("lock_automatics", libcamera.lock_automatics);
+  in.Integer("latency_frames", libcamera.latency_frames, 0, 16);
+  in.Integer("settings_frames", libcamera.settings_frames, 0, 16);
+  in.Number("timeout_ms", libcamera.timeout_ms, 100, 60'000);
+  in.Number("reconnect_ms", libcamera.reconnect_ms, 0, 600'000);
+  in.Table("controls", [&](TomlReader& controls) { controls.Scalars(libcamera.controls); });
+}
+
 CameraConfig ReadCamera(TomlReader& in) {
   CameraConfig camera = DefaultSimStation().cameras.front();
   in.Text("id", camera.id);
   in.Text("model", camera.model);
-  if (const auto word = in.Word("driver", {"sim", "v4l2"})) {
+  if (const auto word = in.Word("driver", {"sim", "v4l2", "libcamera"})) {
     camera.driver = static_cast<CameraDriver>(*word);
   }
   in.Table("v4l2", [&](TomlReader& v4l2) { ReadV4l2(v4l2, camera.v4l2); });
+  in.Table("libcamera", [&](TomlReader& libcamera) { ReadLibcamera(libcamera, camera.libcamera); });
   in.Integer("width_px", camera.w, 16, 20'000);
   in.Integer("height_px", camera.h, 16, 20'000);
   in.Number("azimuth_deg", camera.azimuth_deg, -360, 360);

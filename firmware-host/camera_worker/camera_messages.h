@@ -13,17 +13,10 @@
 
 #include "drivers/base/result.h"
 #include "drivers/camera/camera.h"
+#include "firmware-host/camera_worker/camera_listing.h"
 #include "firmware-host/camera_worker/worker_link.h"
 
 namespace scan {
-
-// A camera that a worker program can open.
-struct CameraListing {
-  std::string id;                    // as the camera's library calls it: what `options` may name
-  std::string model;                 // for people
-  std::vector<std::string> details;  // sizes, port, battery, ..., one a line
-  friend bool operator==(const CameraListing&, const CameraListing&) = default;
-};
 
 nlohmann::json ToJson(const CameraInfo& info);
 nlohmann::json ToJson(const CameraSettings& settings);

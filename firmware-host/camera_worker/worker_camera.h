@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "drivers/camera/camera.h"
+#include "firmware-host/camera_worker/camera_listing.h"
 #include "firmware-host/camera_worker/worker_process.h"
 
 namespace scan {
 
-struct CameraListing;
 class WorkerConnection;
 
 // After these times without an answer a worker hangs, and is killed.

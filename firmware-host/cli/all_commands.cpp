@@ -14,6 +14,7 @@ void AddAllCommands(CommandSet& commands) {
   AddImport(commands);
   CLI::App& device = commands.AddGroup(nullptr, "device", "Devices tried by hand");
   AddCameraDevices(commands, device);
+  AddLibcameraDevices(commands, device);
   AddMotionDevices(commands, device);
   AddUsbDevices(commands, device);
   AddDoctor(commands);

@@ -24,6 +24,9 @@ void AddDoctor(CommandSet& commands);
 // device_commands.cpp: device camera list|grab|controls|set
 void AddCameraDevices(CommandSet& commands, CLI::App& device);
 
+// libcamera_commands.cpp
+void AddLibcameraDevices(CommandSet& commands, CLI::App& device);
+
 // session_commands.cpp
 void AddReplay(CommandSet& commands);
 void AddVerify(CommandSet& commands);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "drivers/usb/libusb_bus.h"
 #include "drivers/usb/usb_access.h"
 #include "firmware-host/cli/commands.h"
+#include "firmware-host/devices/open_libcamera.h"
 
 namespace scan {
 namespace {
@@ -163,6 +165,37 @@ void CheckTics(std::vector<Finding>& findings, const StationConfig& config) {
   }
 }
 
+// What libcamera finds; and, of a station that uses it, its cameras.
+void CheckLibcamera(std::vector<Finding>& findings, const StationConfig& config) {
+  const auto uses = [](const CameraConfig& camera) {
+    return camera.driver == CameraDriver::libcamera;
+  };
+  const bool needed = std::any_of(config.cameras.begin(), config.cameras.end(), uses);
+  const auto listed = ListLibcameras();
+  if (!listed) {
+    findings.push_back({needed ? Verdict::bad : Verdict::hint, "libcamera",
+                        ToString(listed.error()), listed.error().mend});
+    return;
+  }
+  std::vector<LibcameraEntry> cameras;
+  std::string names;
+  for (const CameraListing& camera : *listed) {
+    cameras.push_back({camera.id, camera.model});
+    names += (names.empty() ? "" : ", ") + camera.model;
+  }
+  findings.push_back({Verdict::good, "libcamera",
+                      names.empty() ? "its worker runs; it finds no camera" : "finds " + names,
+                      ""});
+  for (const CameraConfig& camera : config.cameras) {
+    if (!uses(camera)) continue;
+    const auto found = FindLibcamera(cameras, camera.libcamera.camera);
+    const Verdict verdict = found ? Verdict::good : Verdict::bad;
+    findings.push_back({verdict, "camera " + camera.id,
+                        found ? "is " + found->model : found.error().what,
+                        found ? "" : found.error().mend});
+  }
+}
+
 Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   std::vector<Finding> findings;
   StationConfig config;
@@ -181,6 +214,7 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   CheckRelease(findings);
   if (config.motion_driver != MotionDriver::tic) CheckRealTime(findings, config.gpio.real_time);
   CheckTics(findings, config);
+  CheckLibcamera(findings, config);
 
   CommandOutput output{{{"findings", Json::array()}}, ""};
   bool bad = false;

@@ -1,4 +1,5 @@
-// The real station: cameras of this process, motion and lamp in scanstation-motiond.
+// The real station: cameras of this process or of workers that it starts, motion and lamp in
+// scanstation-motiond.
 #pragma once
 
 #include <filesystem>

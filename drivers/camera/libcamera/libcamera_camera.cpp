@@ -256,7 +256,7 @@ Result<std::optional<Frame>> LibcameraCamera::Judge(const LibcameraCompletion& d
     ++counters_.stale;
     return std::nullopt;
   }
-  if (!Settled(done)) {
+  if (done.startup || !Settled(done)) {
     ++counters_.unsettled;
     return std::nullopt;
   }

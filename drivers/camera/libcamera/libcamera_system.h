@@ -49,6 +49,7 @@ struct LibcameraCompletion {
   int request = 0;
   bool cancelled = false;  // it holds no picture
   bool damaged = false;    // the driver says that its data are
+  bool startup = false;    // of a camera that is still finding its settings
   std::uint32_t sequence = 0;
   std::int64_t completed_ns = 0;  // monotonic
   std::optional<std::int64_t> sensor_timestamp_ns, frame_duration_ns;

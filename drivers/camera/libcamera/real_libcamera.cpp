@@ -45,7 +45,7 @@ lc::StreamRole RoleOf(LibcameraRole role) {
 
 LibcameraEntry EntryOf(const lc::Camera& camera) {
   const auto model = camera.properties().get(lc::properties::Model);
-  return {camera.id(), model ? *model : camera.id()};
+  return {camera.id(), model ? std::string(*model) : camera.id()};
 }
 
 std::optional<double> NumberOf(const lc::ControlValue& value) {
@@ -367,7 +367,10 @@ class RealDevice final : public LibcameraDevice {
     completion.cancelled = request.status() == lc::Request::RequestCancelled;
     const lc::FrameBuffer* buffer = request.findBuffer(stream_);
     const lc::FrameMetadata& frame = buffer->metadata();
-    completion.damaged = frame.status != lc::FrameMetadata::FrameSuccess;
+    completion.damaged = frame.status == lc::FrameMetadata::FrameError ||
+                         frame.status == lc::FrameMetadata::FrameCancelled;
+    // Later releases have one more status: of a camera that has just been started.
+    completion.startup = !completion.damaged && frame.status != lc::FrameMetadata::FrameSuccess;
     completion.sequence = frame.sequence;
     const lc::ControlList& metadata = request.metadata();
     if (const auto stamp = metadata.get(lc::controls::SensorTimestamp))

@@ -67,6 +67,7 @@ TEST(StationFile, EveryKeyIsReadAndEveryOneIsCommented) {
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-uvc.toml")), 18);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-tic-uvc.toml")), 40);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-rpi5.toml")), 50);
+  EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-libcamera.toml")), 17);
 }
 
 TEST(StationFile, AUsbCameraHasItsPortFormatAndControls) {
@@ -80,6 +81,19 @@ TEST(StationFile, AUsbCameraHasItsPortFormatAndControls) {
   expected.pixel_format = "MJPG";
   expected.controls = {{"power_line_frequency", "50 Hz"}, {"white_balance_temperature", "5000"}};
   EXPECT_EQ(camera.v4l2, expected);
+}
+
+TEST(StationFile, ACameraOfLibcameraHasItsStreamAndControls) {
+  const auto read = LoadStationConfig(SCAN_SOURCE_DIR "/configs/station-libcamera.toml");
+  ASSERT_TRUE(read) << ToString(read.error());
+  const CameraConfig& camera = read->cameras.front();
+  EXPECT_EQ(camera.driver, CameraDriver::libcamera);
+  LibcameraConfig expected;
+  expected.camera = "imx477";
+  expected.pixel_format = "RGB888";
+  expected.latency_frames = 0;
+  expected.controls = {{"AwbEnable", "false"}, {"Sharpness", "0.0"}};
+  EXPECT_EQ(camera.libcamera, expected);
 }
 
 struct BadCase {
@@ -125,6 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"[[camera]]\ndriver = 'webcam'", "none of its words", "s.toml:2"},
         BadCase{"[[camera]]\n[camera.v4l2]\ndevice = 0", "unknown key camera.v4l2.device",
                 "s.toml:3"},
+        BadCase{"[[camera]]\n[camera.libcamera]\nrole = 'video'", "video", "s.toml:3"},
         BadCase{"[[camera]]\n[camera.v4l2.controls]\ngain = 1.5", "neither a whole number",
                 "s.toml:3"},
         BadCase{"[sim]\nformat = 'bmp'", "none of its words", "s.toml:2"},

@@ -1,0 +1,55 @@
+#include "firmware-host/devices/open_libcamera.h"
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "drivers/usb/libusb_bus.h"
+#include "firmware-host/camera_worker/libcamera_options.h"
+
+namespace scan {
+namespace {
+
+CameraWorkerLauncher Launcher() { return WorkerProgram(WorkerProgramPath(kLibcameraWorker)); }
+
+// libcamera's id of a UVC camera ends with its vendor and product: "...-1:1.0-046d:0825".
+std::optional<UsbSelector> UsbDeviceIn(const std::string& id) {
+  if (id.size() < 10 || id[id.size() - 10] != '-' || id[id.size() - 5] != ':') return {};
+  const char* text = id.data() + id.size() - 9;
+  UsbSelector selector;
+  std::uint16_t product = 0;
+  const auto vendor = std::from_chars(text, text + 4, selector.vendor, 16);
+  const auto second = std::from_chars(text + 5, text + 9, product, 16);
+  if (vendor.ptr != text + 4 || second.ptr != text + 9) return {};
+  selector.products = {product};
+  return selector;
+}
+
+Status ResetUsb(const UsbSelector& selector) {
+  SCAN_TRY(const auto bus, MakeLibusbBus());
+  SCAN_TRY(const auto devices, bus->List());
+  SCAN_TRY(const UsbIdentity identity, FindUsb(devices, selector, "camera"));
+  SCAN_TRY(const auto device, bus->Open(identity));
+  return device->Reset();
+}
+
+std::chrono::milliseconds Ms(double ms) { return std::chrono::milliseconds(std::llround(ms)); }
+
+}  // namespace
+
+Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options) {
+  WorkerCameraOptions worker;
+  worker.id = options.id;
+  worker.options = ToWorkerOptions(options);
+  // The driver's own limits come first: they say more about what is wrong.
+  worker.limits.open += Ms(options.config.reconnect_ms);
+  worker.limits.configure += Ms(options.config.reconnect_ms);
+  worker.limits.grab += Ms(options.config.reconnect_ms + 5 * options.config.timeout_ms);
+  if (const auto usb = UsbDeviceIn(options.config.camera))
+    worker.on_hang = [usb] { return ResetUsb(*usb); };
+  return WorkerCamera::Open(std::move(worker), Launcher());
+}
+
+Result<std::vector<CameraListing>> ListLibcameras() { return ListWorkerCameras(Launcher()); }
+
+}  // namespace scan

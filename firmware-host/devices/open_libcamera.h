@@ -1,0 +1,21 @@
+// A camera of libcamera, in a worker of its own.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "drivers/base/result.h"
+#include "drivers/camera/camera.h"
+#include "drivers/camera/libcamera/libcamera_camera.h"
+#include "firmware-host/camera_worker/worker_camera.h"
+
+namespace scan {
+
+// The worker's time limits follow those of the configuration. A UVC camera, whose id names its USB
+// port, is reset before the last attempt at recovery. Errors: as WorkerCamera::Open.
+Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options);
+
+// Errors: as ListWorkerCameras.
+Result<std::vector<CameraListing>> ListLibcameras();
+
+}  // namespace scan
