@@ -64,6 +64,7 @@ struct ContourMatch {
   double length_px = 0;
   std::array<std::uint32_t, 2> vertices{};  // of the mesh edge the point lies on
   double arc_px = 0;                        // place of `target` along the photo's contour
+  double share_px = 0;  // of the photo's contour that is nearer to this target than to others
 };
 
 struct MatchResult {
@@ -75,7 +76,8 @@ struct MatchResult {
 // Partners along the model's image normal, within +-window_px of where the mask bias puts them,
 // normals within 60 degrees, so that the far side of a thin leg is never taken. Flagged pieces of
 // the photo's contour are neither partners nor missing ones, and a sample in an ignored region
-// needs none.
+// needs none. Every piece of the photo's contour is shared out once, however many folds of the mesh
+// lie along it: where edges zigzag along an outline, samples come in heaps.
 MatchResult MatchContour(std::span<const ContourSample> samples, const PhotoContour& photo,
                          double mask_bias_px, double window_px);
 

@@ -18,7 +18,9 @@ RefineOptions ScaledTo(RefineOptions options, int width) {
   const double scale = width / 1848.0;
   options.first_window_px *= scale;
   options.last_window_px = std::max(4.0, options.last_window_px * scale);
-  options.spacing_px = std::max(2.0, options.spacing_px * scale);
+  // Not more in larger pictures: the noise of an outline hangs together over a few pixels whatever
+  // their size, and samples 8 px apart would leave half of it unused.
+  options.spacing_px = std::max(2.0, options.spacing_px * std::min(1.0, scale));
   options.correlation_floor_px *= scale;
   return options;
 }
