@@ -17,6 +17,7 @@ pkg_check_modules(libgpiod REQUIRED IMPORTED_TARGET libgpiod>=1.6)
 string(REGEX MATCH "^[0-9]+" SCAN_GPIOD_MAJOR ${libgpiod_VERSION})
 pkg_check_modules(libcamera REQUIRED IMPORTED_TARGET libcamera)
 pkg_check_modules(libusb REQUIRED IMPORTED_TARGET libusb-1.0)
+pkg_check_modules(libgphoto2 REQUIRED IMPORTED_TARGET libgphoto2>=2.5.20)
 pkg_check_modules(HTTPLIB REQUIRED IMPORTED_TARGET cpp-httplib)
 
 if(SCAN_RECONSTRUCTION)

@@ -11,6 +11,7 @@
 
 #include "drivers/base/result.h"
 #include "drivers/camera/libcamera/libcamera_config.h"
+#include "drivers/camera/ptp/ptp_config.h"
 #include "drivers/camera/v4l2/v4l2_config.h"
 #include "drivers/io/light_config.h"
 #include "drivers/motion/axis_config.h"
@@ -38,7 +39,7 @@ struct LensConfig {
 };
 
 // What gives the pictures.
-enum class CameraDriver { sim, v4l2, libcamera };
+enum class CameraDriver { sim, v4l2, libcamera, ptp };
 
 struct CameraConfig {
   std::string id = "c0";
@@ -46,6 +47,7 @@ struct CameraConfig {
   CameraDriver driver = CameraDriver::sim;
   V4l2Config v4l2;            // of the v4l2 driver
   LibcameraConfig libcamera;  // of the libcamera driver
+  PtpConfig ptp;              // of the ptp driver
   int w = 1848, h = 1224;
   double azimuth_deg = -90;  // where the camera stands, about the turntable axis from station +x
   LensConfig lens;

@@ -160,15 +160,44 @@ void ReadLibcamera(TomlReader& in, LibcameraConfig& libcamera) {
   in.Table("controls", [&](TomlReader& controls) { controls.Scalars(libcamera.controls); });
 }
 
+void ReadPtp(TomlReader& in, PtpConfig& ptp) {
+  in.Text("port", ptp.port);
+  in.Text("serial", ptp.serial);
+  in.Text("model", ptp.model);
+  const std::vector<std::string> targets{"ram", "card"};
+  if (const auto word = in.Word("target", targets)) ptp.target = targets[*word];
+  in.Text("quality", ptp.quality);
+  in.Number("f_number", ptp.f_number, 0, 64);
+  in.Number("base_iso", ptp.base_iso, 0, 102'400);
+  in.Integer("files", ptp.files, 0, 2);
+  in.Flag("delete_from_card", ptp.delete_from_card);
+  in.Flag("manual_focus", ptp.manual_focus);
+  in.Number("min_battery_percent", ptp.min_battery_percent, 0, 100);
+  in.Integer("min_shots", ptp.min_shots, 0, 100'000);
+  in.Number("settings_ms", ptp.settings_ms, 100, 60'000);
+  in.Number("picture_ms", ptp.picture_ms, 1000, 600'000);
+  in.Number("pair_ms", ptp.pair_ms, 100, 600'000);
+  in.Number("reconnect_ms", ptp.reconnect_ms, 0, 600'000);
+  in.Text("gpio_chip", ptp.gpio_chip);
+  in.Text("release_line", ptp.release_line);
+  in.Flag("release_active_low", ptp.release_active_low);
+  in.Number("release_ms", ptp.release_ms, 10, 10'000);
+  in.Text("hot_shoe_line", ptp.hot_shoe_line);
+  in.Flag("hot_shoe_active_low", ptp.hot_shoe_active_low);
+  in.Number("curtain_ms", ptp.curtain_ms, 0, 100);
+  in.Table("settings", [&](TomlReader& settings) { settings.Scalars(ptp.settings); });
+}
+
 CameraConfig ReadCamera(TomlReader& in) {
   CameraConfig camera = DefaultSimStation().cameras.front();
   in.Text("id", camera.id);
   in.Text("model", camera.model);
-  if (const auto word = in.Word("driver", {"sim", "v4l2", "libcamera"})) {
+  if (const auto word = in.Word("driver", {"sim", "v4l2", "libcamera", "ptp"})) {
     camera.driver = static_cast<CameraDriver>(*word);
   }
   in.Table("v4l2", [&](TomlReader& v4l2) { ReadV4l2(v4l2, camera.v4l2); });
   in.Table("libcamera", [&](TomlReader& libcamera) { ReadLibcamera(libcamera, camera.libcamera); });
+  in.Table("ptp", [&](TomlReader& ptp) { ReadPtp(ptp, camera.ptp); });
   in.Integer("width_px", camera.w, 16, 20'000);
   in.Integer("height_px", camera.h, 16, 20'000);
   in.Number("azimuth_deg", camera.azimuth_deg, -360, 360);

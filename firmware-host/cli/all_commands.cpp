@@ -15,6 +15,7 @@ void AddAllCommands(CommandSet& commands) {
   CLI::App& device = commands.AddGroup(nullptr, "device", "Devices tried by hand");
   AddCameraDevices(commands, device);
   AddLibcameraDevices(commands, device);
+  AddPtpDevices(commands, device);
   AddMotionDevices(commands, device);
   AddUsbDevices(commands, device);
   AddDoctor(commands);

@@ -27,6 +27,9 @@ void AddCameraDevices(CommandSet& commands, CLI::App& device);
 // libcamera_commands.cpp
 void AddLibcameraDevices(CommandSet& commands, CLI::App& device);
 
+// ptp_commands.cpp: device ptp list|info|get|set|grab
+void AddPtpDevices(CommandSet& commands, CLI::App& device);
+
 // session_commands.cpp
 void AddReplay(CommandSet& commands);
 void AddVerify(CommandSet& commands);

@@ -16,6 +16,7 @@
 #include "drivers/usb/usb_access.h"
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/devices/open_libcamera.h"
+#include "firmware-host/devices/open_ptp.h"
 
 namespace scan {
 namespace {
@@ -196,6 +197,29 @@ void CheckLibcamera(std::vector<Finding>& findings, const StationConfig& config)
   }
 }
 
+// Still cameras, through their worker: asked only where the station has one.
+void CheckStillCameras(std::vector<Finding>& findings, const StationConfig& config) {
+  for (const CameraConfig& camera : config.cameras) {
+    if (camera.driver != CameraDriver::ptp) continue;
+    const std::string subject = "camera " + camera.id;
+    const auto info = AskPtp("info", camera.ptp, {});
+    if (!info) {
+      findings.push_back({Verdict::bad, subject, ToString(info.error()), info.error().mend});
+      continue;
+    }
+    findings.push_back({Verdict::good, subject,
+                        fmt::format("{} at port {}, battery {} %", info->value("camera", ""),
+                                    info->value("port", ""), info->value("battery_percent", -1.0)),
+                        ""});
+    if (info->value("battery_percent", 100.0) < camera.ptp.min_battery_percent)
+      findings.push_back({Verdict::bad, subject, "its battery is low", "charge it"});
+    for (const auto& program : info->value("competitors", std::vector<std::string>()))
+      findings.push_back({Verdict::hint, subject, program + " takes cameras that are plugged in",
+                          "end it; of a desktop: systemctl --user mask --now "
+                          "gvfs-gphoto2-volume-monitor.service"});
+  }
+}
+
 Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   std::vector<Finding> findings;
   StationConfig config;
@@ -215,6 +239,7 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   if (config.motion_driver != MotionDriver::tic) CheckRealTime(findings, config.gpio.real_time);
   CheckTics(findings, config);
   CheckLibcamera(findings, config);
+  CheckStillCameras(findings, config);
 
   CommandOutput output{{{"findings", Json::array()}}, ""};
   bool bad = false;

@@ -6,6 +6,7 @@
 #include "drivers/camera/v4l2/v4l2_camera.h"
 #include "firmware-host/camera_worker/libcamera_options.h"
 #include "firmware-host/devices/open_libcamera.h"
+#include "firmware-host/devices/open_ptp.h"
 
 namespace scan {
 namespace {
@@ -19,6 +20,8 @@ Result<std::unique_ptr<Camera>> OpenDriver(const CameraConfig& config,
     }
     case CameraDriver::libcamera:
       return OpenLibcamera({config.id, config.w, config.h, config.libcamera});
+    case CameraDriver::ptp:
+      return OpenPtp({config.id, config.w, config.h, config.ptp});
     case CameraDriver::sim:
       break;
   }

@@ -68,6 +68,7 @@ TEST(StationFile, EveryKeyIsReadAndEveryOneIsCommented) {
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-tic-uvc.toml")), 40);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-rpi5.toml")), 50);
   EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-libcamera.toml")), 17);
+  EXPECT_GT(CountKeysThatAreRead(ConfigFile("station-dslr.toml")), 30);
 }
 
 TEST(StationFile, AUsbCameraHasItsPortFormatAndControls) {
@@ -94,6 +95,19 @@ TEST(StationFile, ACameraOfLibcameraHasItsStreamAndControls) {
   expected.latency_frames = 0;
   expected.controls = {{"AwbEnable", "false"}, {"Sharpness", "0.0"}};
   EXPECT_EQ(camera.libcamera, expected);
+}
+
+TEST(StationFile, ATetheredCameraHasItsPortQualityAndSettings) {
+  const auto read = LoadStationConfig(SCAN_SOURCE_DIR "/configs/station-dslr.toml");
+  ASSERT_TRUE(read) << ToString(read.error());
+  const CameraConfig& camera = read->cameras.front();
+  EXPECT_EQ(camera.driver, CameraDriver::ptp);
+  PtpConfig expected;  // the file shows the defaults, but for what only a station can know
+  expected.port = "1-2";
+  expected.quality = "NEF+Fine";
+  expected.f_number = 11;
+  expected.settings = {{"whitebalance", "Daylight"}};
+  EXPECT_EQ(camera.ptp, expected);
 }
 
 struct BadCase {
@@ -140,6 +154,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"[[camera]]\n[camera.v4l2]\ndevice = 0", "unknown key camera.v4l2.device",
                 "s.toml:3"},
         BadCase{"[[camera]]\n[camera.libcamera]\nrole = 'video'", "video", "s.toml:3"},
+        BadCase{"[[camera]]\n[camera.ptp]\ntarget = 'cloud'", "none of its words", "s.toml:3"},
         BadCase{"[[camera]]\n[camera.v4l2.controls]\ngain = 1.5", "neither a whole number",
                 "s.toml:3"},
         BadCase{"[sim]\nformat = 'bmp'", "none of its words", "s.toml:2"},
