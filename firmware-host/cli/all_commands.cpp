@@ -18,6 +18,7 @@ void AddAllCommands(CommandSet& commands) {
   AddPtpDevices(commands, device);
   AddMotionDevices(commands, device);
   AddUsbDevices(commands, device);
+  AddTmcDevices(commands, device);
   AddDoctor(commands);
 #ifdef SCAN_RECONSTRUCTION
   AddSurface(commands);

@@ -28,6 +28,7 @@ struct CliContext {
 struct CommandOutput {
   Json json;
   std::string text;
+  int exit_code = 0;  // of a command that has done its work and found something wanting
 };
 
 using CommandFn = std::function<Result<CommandOutput>(const CliContext&)>;

@@ -12,11 +12,14 @@ void AddCapture(CommandSet& commands);
 void AddResume(CommandSet& commands);
 void AddStationControl(CommandSet& commands);  // confirm status stop pause continue
 
-// motion_commands.cpp: device motion ..., device gpio ...
+// motion_commands.cpp: device motion ..., device light, device gpio ...
 void AddMotionDevices(CommandSet& commands, CLI::App& device);
 
 // usb_commands.cpp: device usb ..., device tic ...
 void AddUsbDevices(CommandSet& commands, CLI::App& device);
+
+// tmc2209_commands.cpp: device tmc2209 ...
+void AddTmcDevices(CommandSet& commands, CLI::App& device);
 
 // doctor_command.cpp
 void AddDoctor(CommandSet& commands);

@@ -1,14 +1,18 @@
 // scanstation doctor: what motion on this machine has, what it lacks, how to mend it.
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <thread>
 
 #include "drivers/io/gpio/gpiod_lines.h"
+#include "drivers/io/pwm/pwm_lamp.h"
 #include "drivers/motion/real_time.h"
 #include "drivers/motion/tic/tic_protocol.h"
 #include "drivers/station/station_file.h"
@@ -47,7 +51,7 @@ void CheckChips(std::vector<Finding>& findings, bool needed) {
 }
 
 std::vector<GpioPin> PinsOf(const GpioMotionConfig& gpio) {
-  std::vector<GpioPin> pins{gpio.emergency_stop, gpio.cover};
+  std::vector<GpioPin> pins{gpio.emergency_stop, gpio.cover, gpio.motor_power};
   for (const GpioAxisWiring* axis : {&gpio.turntable, &gpio.lift}) {
     for (const GpioPin& pin :
          {axis->step, axis->direction, axis->enable, axis->brake, axis->endstop, axis->index}) {
@@ -220,6 +224,61 @@ void CheckStillCameras(std::vector<Finding>& findings, const StationConfig& conf
   }
 }
 
+// Whether the serial lines are there and permitted; scanstation-motiond may be using them.
+void CheckSerialLines(std::vector<Finding>& findings, const StationConfig& config) {
+  for (const auto& [axis, driver] : {std::pair("turntable", &config.turntable_tmc2209),
+                                     std::pair("lift", &config.lift_tmc2209)}) {
+    if (driver->port.empty()) continue;
+    if (::access(driver->port.c_str(), R_OK | W_OK) == 0) {
+      findings.push_back({Verdict::good, "TMC2209",
+                          fmt::format("{}: address {} at {}", axis, driver->address, driver->port),
+                          ""});
+    } else {
+      findings.push_back(
+          {Verdict::bad, "TMC2209",
+           fmt::format("{}: {}: {}", axis, driver->port, std::strerror(errno)),
+           errno == EACCES ? "add this user to the group of that file (dialout)"
+                           : "switch the serial line on (dtoverlay=uart0-pi5), or name another"});
+    }
+  }
+}
+
+// Looks only, as above.
+void CheckLight(std::vector<Finding>& findings, const LightConfig& light) {
+  if (light.driver == LightDriver::none) {
+    findings.push_back({Verdict::good, "light", "the room's: the station has no lamp", ""});
+  } else if (light.driver == LightDriver::gpio) {
+    const auto chips = ListGpiodChips();
+    const auto place = FindGpioLines(chips, {light.chip, "", {{light.line.name}}});
+    if (!place) {
+      findings.push_back({Verdict::bad, "light", ToString(place.error()), place.error().mend});
+      return;
+    }
+    const GpioChipInfo& chip = chips[place->chip];
+    const GpioLineInfo& line = chip.lines[place->offsets[0]];
+    if (line.used && !line.consumer.starts_with("scanstation")) {
+      findings.push_back({Verdict::bad, "light",
+                          fmt::format("{} is held by '{}'", light.line.name, line.consumer),
+                          "end that program, or free the pin from its function"});
+      return;
+    }
+    findings.push_back(
+        {Verdict::good, "light", fmt::format("{} on {}", light.line.name, chip.label), ""});
+  } else {
+    const auto chip = FindPwmChip(*KernelPwmFiles(), light.chip);
+    if (!chip) {
+      findings.push_back({Verdict::bad, "light", chip.error().what, chip.error().mend});
+    } else if (light.channel >= chip->channels) {
+      findings.push_back({Verdict::bad, "light",
+                          fmt::format("{} has {} channels", chip->device, chip->channels),
+                          "choose another light.channel"});
+    } else {
+      findings.push_back({Verdict::good, "light",
+                          fmt::format("channel {} of {}", light.channel, chip->device), ""});
+    }
+  }
+}
+
 Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   std::vector<Finding> findings;
   StationConfig config;
@@ -234,12 +293,16 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   }
   const bool gpio = config.motion_driver == MotionDriver::gpio;
   CheckChips(findings, gpio);
-  if (gpio) CheckLines(findings, config.gpio);
+  if (gpio) {
+    CheckLines(findings, config.gpio);
+    CheckSerialLines(findings, config);
+  }
   CheckRelease(findings);
   if (config.motion_driver != MotionDriver::tic) CheckRealTime(findings, config.gpio.real_time);
   CheckTics(findings, config);
   CheckLibcamera(findings, config);
   CheckStillCameras(findings, config);
+  CheckLight(findings, config.light);
 
   CommandOutput output{{{"findings", Json::array()}}, ""};
   bool bad = false;
@@ -254,6 +317,7 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
     if (!finding.mend.empty()) output.text += fmt::format("{:>24}mend: {}\n", "", finding.mend);
   }
   output.json["ready"] = !bad;
+  output.exit_code = bad ? 1 : 0;
   return output;
 }
 
@@ -262,8 +326,11 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
 void AddDoctor(CommandSet& commands) {
   auto config = std::make_shared<std::filesystem::path>();
   commands
-      .Add("doctor", "What this machine has and lacks for a station, and how to mend it",
-           [config](const CliContext&) { return RunDoctor(*config); })
+      .Add(
+          "doctor",
+          "What this machine has and lacks for a station, and how to mend it; exit code 1 when the "
+          "station is not ready",
+          [config](const CliContext&) { return RunDoctor(*config); })
       .add_option("--config", *config, "station file whose devices are looked for");
 }
 

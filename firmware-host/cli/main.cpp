@@ -96,5 +96,5 @@ int main(int argc, char** argv) {
     fmt::print("{}\n", output->json.dump(2));
   else
     fmt::print("{}", output->text);
-  return 0;
+  return output->exit_code;
 }

@@ -2,12 +2,15 @@
 // scanstation-motiond, and scanstation device gpio ACTION, on the lines themselves.
 #include <fmt/format.h>
 
+#include <charconv>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
 
 #include "drivers/base/clock.h"
+#include "drivers/io/gpio/gpio_pin.h"
 #include "drivers/io/gpio/gpiod_lines.h"
-#include "drivers/motion/gpio/gpio_motion_config.h"
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/protocol/motion_client.h"
 #include "firmware-host/protocol/motion_messages.h"
@@ -123,6 +126,52 @@ void AddMotion(CommandSet& commands, CLI::App& device) {
       ->capture_default_str();
 }
 
+struct LightOptions {
+  std::filesystem::path socket = "/run/scanstation/motiond.sock";
+  std::string level;
+  double seconds = 0;
+};
+
+Result<double> ParseLevel(const std::string& text) {
+  if (text == "on") return 1.0;
+  if (text == "off") return 0.0;
+  double level = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
+  if (error == std::errc() && end == text.data() + text.size() && level >= 0 && level <= 1)
+    return level;
+  return BadInput(fmt::format("'{}' is no level", text), "device light",
+                  "give on, off or a number from 0 to 1");
+}
+
+// Lit as long as the command runs: a lamp that nobody answers for goes dark.
+Result<CommandOutput> SetLight(const LightOptions& options, const CliContext& context) {
+  SCAN_TRY(const double level, ParseLevel(options.level));
+  SCAN_TRY(const auto motion, Connect({options.socket, {}}));
+  SCAN_CHECK(motion->SetLightLevel(level));
+  if (level > 0) {
+    fmt::print(stderr, "lit until {}\n",
+               options.seconds > 0 ? fmt::format("{} s are over", options.seconds) : "interrupted");
+    SystemClock clock;
+    const auto lit_ns = options.seconds > 0 ? std::llround(options.seconds * 1e9)
+                                            : std::numeric_limits<std::int64_t>::max() / 4;
+    clock.SleepFor(lit_ns, context.stop);
+    SCAN_CHECK(motion->SetLightLevel(0));
+  }
+  return CommandOutput{{{"level", level}},
+                       fmt::format("light {}\n", level > 0 ? "was lit" : "off")};
+}
+
+void AddLight(CommandSet& commands, CLI::App& device) {
+  auto options = std::make_shared<LightOptions>();
+  CLI::App& light = commands.AddTo(
+      device, "light", "The station's lamp, through scanstation-motiond; lit until interrupted",
+      [options](const CliContext& context) { return SetLight(*options, context); });
+  light.add_option("level", options->level, "on, off, or 0 to 1")->required();
+  light.add_option("--seconds", options->seconds, "end after so long")->check(Positive());
+  light.add_option("--socket", options->socket, "scanstation-motiond's socket")
+      ->capture_default_str();
+}
+
 Result<CommandOutput> ListGpio() {
   CommandOutput output{{{"libgpiod", GpiodVersion()}, {"chips", Json::array()}}, ""};
   for (const GpioChipInfo& chip : ListGpiodChips()) {
@@ -198,6 +247,7 @@ void AddGpio(CommandSet& commands, CLI::App& device) {
 
 void AddMotionDevices(CommandSet& commands, CLI::App& device) {
   AddMotion(commands, device);
+  AddLight(commands, device);
   AddGpio(commands, device);
 }
 
