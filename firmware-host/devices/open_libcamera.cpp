@@ -1,11 +1,10 @@
 #include "firmware-host/devices/open_libcamera.h"
 
 #include <charconv>
-#include <cmath>
 #include <optional>
 
-#include "drivers/usb/libusb_bus.h"
 #include "firmware-host/camera_worker/libcamera_options.h"
+#include "firmware-host/devices/worker_recovery.h"
 
 namespace scan {
 namespace {
@@ -25,16 +24,6 @@ std::optional<UsbSelector> UsbDeviceIn(const std::string& id) {
   return selector;
 }
 
-Status ResetUsb(const UsbSelector& selector) {
-  SCAN_TRY(const auto bus, MakeLibusbBus());
-  SCAN_TRY(const auto devices, bus->List());
-  SCAN_TRY(const UsbIdentity identity, FindUsb(devices, selector, "camera"));
-  SCAN_TRY(const auto device, bus->Open(identity));
-  return device->Reset();
-}
-
-std::chrono::milliseconds Ms(double ms) { return std::chrono::milliseconds(std::llround(ms)); }
-
 }  // namespace
 
 Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options) {
@@ -42,11 +31,11 @@ Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options) {
   worker.id = options.id;
   worker.options = ToWorkerOptions(options);
   // The driver's own limits come first: they say more about what is wrong.
-  worker.limits.open += Ms(options.config.reconnect_ms);
-  worker.limits.configure += Ms(options.config.reconnect_ms);
-  worker.limits.grab += Ms(options.config.reconnect_ms + 5 * options.config.timeout_ms);
+  worker.limits.open += WholeMs(options.config.reconnect_ms);
+  worker.limits.configure += WholeMs(options.config.reconnect_ms);
+  worker.limits.grab += WholeMs(options.config.reconnect_ms + 5 * options.config.timeout_ms);
   if (const auto usb = UsbDeviceIn(options.config.camera))
-    worker.on_hang = [usb] { return ResetUsb(*usb); };
+    worker.on_hang = [usb] { return ResetUsbCamera(*usb); };
   return WorkerCamera::Open(std::move(worker), Launcher());
 }
 

@@ -11,8 +11,9 @@
 
 namespace scan {
 
-// The worker's time limits follow those of the configuration. A UVC camera, whose id names its USB
-// port, is reset before the last attempt at recovery. Errors: as WorkerCamera::Open.
+// The worker's time limits follow those of the configuration. A UVC camera, whose id
+// names vendor and product, is reset before the last attempt at recovery where it is the only one.
+// Errors: as WorkerCamera::Open.
 Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options);
 
 // Errors: as ListWorkerCameras.

@@ -1,12 +1,10 @@
 #include "firmware-host/devices/open_ptp.h"
 
-#include <cmath>
-
-#include "drivers/usb/libusb_bus.h"
 #include "firmware-host/camera_worker/camera_messages.h"
 #include "firmware-host/camera_worker/ptp_options.h"
 #include "firmware-host/camera_worker/worker_camera.h"
 #include "firmware-host/camera_worker/worker_tool.h"
+#include "firmware-host/devices/worker_recovery.h"
 
 namespace scan {
 namespace {
@@ -16,16 +14,6 @@ constexpr std::chrono::milliseconds kLibraryTime{20'000};  // libgphoto2's own t
 
 std::filesystem::path Program() { return WorkerProgramPath(kPtpWorker); }
 
-std::chrono::milliseconds Ms(double ms) { return std::chrono::milliseconds(std::llround(ms)); }
-
-Status ResetUsb(const UsbSelector& selector) {
-  SCAN_TRY(const auto bus, MakeLibusbBus());
-  SCAN_TRY(const auto devices, bus->List());
-  SCAN_TRY(const UsbIdentity identity, FindUsb(devices, selector, "camera"));
-  SCAN_TRY(const auto device, bus->Open(identity));
-  return device->Reset();
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Camera>> OpenPtp(const PtpCameraOptions& options) {
@@ -34,14 +22,14 @@ Result<std::unique_ptr<Camera>> OpenPtp(const PtpCameraOptions& options) {
   worker.id = options.id;
   worker.options = ToWorkerOptions(options);
   // The driver's own limits come first: they say more about what is wrong.
-  const auto reopening = Ms(config.reconnect_ms) + kLibraryTime;
+  const auto reopening = WholeMs(config.reconnect_ms) + kLibraryTime;
   worker.limits.open = kLibraryTime + reopening;
-  worker.limits.configure = reopening + Ms(10 * config.settings_ms);
+  worker.limits.configure = reopening + WholeMs(10 * config.settings_ms);
   worker.limits.grab =
-      2 * Ms(2 * config.picture_ms + config.pair_ms + 10 * config.settings_ms) + reopening;
+      2 * WholeMs(2 * config.picture_ms + config.pair_ms + 10 * config.settings_ms) + reopening;
   if (!config.port.empty() || !config.serial.empty()) {
     const UsbSelector selector{0, {}, config.port, config.serial};
-    worker.on_hang = [selector] { return ResetUsb(selector); };
+    worker.on_hang = [selector] { return ResetUsbCamera(selector); };
   }
   SCAN_TRY(std::unique_ptr<Camera> camera,
            WorkerCamera::Open(std::move(worker), WorkerProgram(Program())));
