@@ -75,15 +75,21 @@ Status Axis::BeginMove(double target, std::int64_t base_ns) {
   waypoints_.push_back(goal);
   segment_velocity_ = config_.velocity;
   StartSegment(base_ns);
-  if (NextDeadlineNs()) Advance(AxisEvent::motion_started);
-  return {};
+  return BeginEdges();
 }
 
 Status Axis::BeginTravel(double distance, double velocity, std::int64_t base_ns) {
   waypoints_.assign({count_ + std::llround(distance * config_.sign * config_.steps_per_unit)});
   segment_velocity_ = velocity;
   StartSegment(base_ns);
-  if (NextDeadlineNs()) Advance(AxisEvent::motion_started);
+  return BeginEdges();
+}
+
+// The direction now, so that its set-up time has passed when the first edge is due.
+Status Axis::BeginEdges() {
+  if (!NextDeadlineNs()) return {};
+  SCAN_CHECK(port_->SetDirection(plan_.direction() > 0));
+  Advance(AxisEvent::motion_started);
   return {};
 }
 

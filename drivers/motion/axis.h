@@ -73,6 +73,7 @@ class Axis {
   double CountedUnits() const;
   std::int64_t StepsAt(double units) const;
   StepLimits LimitsAt(double velocity) const;
+  Status BeginEdges();
   void StartSegment(std::int64_t base_ns);
   void ClearMotion();
   void FindNextDeadline();
