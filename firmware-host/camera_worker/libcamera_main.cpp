@@ -52,6 +52,6 @@ CameraWorkerRole LibcameraRoleOf() {
 }  // namespace scan
 
 int main() {
-  ::setenv("LIBCAMERA_LOG_LEVELS", "*:WARN", /*overwrite=*/0);
+  ::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", /*overwrite=*/0);
   return scan::CameraWorkerMain(scan::LibcameraRoleOf(), scan::kLibcameraWorker);
 }
