@@ -108,6 +108,19 @@ TEST_F(BadInput, AStationFileWithAnUnknownKeyOrAValueOutOfRange) {
   }
 }
 
+// Not bad input: the doctor has done its work, and the station is not ready.
+TEST_F(BadInput, ADoctorThatFindsAStationNotReadySaysSoWithItsExitCode) {
+  const ProgramRun missing =
+      RunProgram("scanstation", {"doctor", "--config", Path("none.toml"), "--json"});
+  EXPECT_EQ(missing.exit_code, 1) << missing.err;
+  EXPECT_NE(missing.out.find("\"ready\": false"), std::string::npos) << missing.out;
+  const std::string lamp =
+      Write("lamp.toml", "[light]\ndriver = \"pwm\"\nchip = \"no-such-chip\"\n");
+  EXPECT_EQ(RunProgram("scanstation", {"doctor", "--config", lamp}).exit_code, 1);
+  EXPECT_EQ(RunProgram("scanstation", {"doctor", "--config", Write("sim.toml", "")}).exit_code, 0);
+  EXPECT_EQ(RunProgram("scanstation", {"doctor", "--conf", lamp}).exit_code, 2);
+}
+
 TEST_F(BadInput, AnExistingOutputIsNotTouched) {
   const std::string mesh =
       Write("m.ply",
