@@ -11,6 +11,7 @@
 #include "drivers/camera/v4l2/v4l2_camera.h"
 #include "drivers/station/station_file.h"
 #include "firmware-host/cli/commands.h"
+#include "firmware-host/cli/still_files.h"
 #include "firmware-host/devices/open_camera.h"
 
 namespace scan {
@@ -59,7 +60,7 @@ std::string FormatsText(const std::vector<OfferedFormat>& formats) {
   return text;
 }
 
-Result<CommandOutput> ListCameras() {
+Result<CommandOutput> ListKernelCameras() {
   const auto system = Kernel();
   CommandOutput output{{{"cameras", Json::array()}}, ""};
   for (const VideoNode& node : ListCaptureNodes(system)) {
@@ -150,14 +151,6 @@ Status ReadSize(const std::string& text, V4l2CameraOptions& options) {
   return BadInput(fmt::format("'{}' is no size", text), "--size", "write WIDTHxHEIGHT, in pixels");
 }
 
-// still.jpg, or still-3.jpg where several are taken; the extension is the picture's own.
-std::filesystem::path NumberedPath(const std::filesystem::path& out, const std::string& extension,
-                                   int number, int count) {
-  std::filesystem::path path = out;
-  if (count > 1) path.replace_filename(fmt::format("{}-{}", out.stem().string(), number));
-  return path.replace_extension(extension);
-}
-
 Result<std::unique_ptr<Camera>> OpenForStills(const CameraOptions& options) {
   const auto clock = std::make_shared<SystemClock>();
   if (!options.config.empty()) {
@@ -218,7 +211,7 @@ void AddCameraDevices(CommandSet& commands, CLI::App& device) {
   CLI::App& camera = commands.AddGroup(&device, "camera",
                                        "Cameras of the kernel (V4L2); no daemon may be using them");
   commands.AddTo(camera, "list", "Every camera with its port, formats and sizes",
-                 [](const CliContext&) { return ListCameras(); });
+                 [](const CliContext&) { return ListKernelCameras(); });
   {
     auto options = std::make_shared<CameraOptions>();
     AddSelector(

@@ -8,6 +8,7 @@
 
 #include "drivers/base/files.h"
 #include "firmware-host/cli/commands.h"
+#include "firmware-host/cli/still_files.h"
 #include "firmware-host/devices/open_libcamera.h"
 
 namespace scan {
@@ -23,7 +24,7 @@ struct GrabOptions {
   bool force = false;
 };
 
-Result<CommandOutput> ListCameras() {
+Result<CommandOutput> ListLibcameraCameras() {
   SCAN_TRY(const auto cameras, ListLibcameras());
   CommandOutput output{{{"cameras", Json::array()}}, ""};
   for (const CameraListing& camera : cameras) {
@@ -54,14 +55,6 @@ Status ReadControls(const GrabOptions& options, LibcameraConfig& config) {
     config.controls[assignment.substr(0, equals)] = assignment.substr(equals + 1);
   }
   return {};
-}
-
-// still.jpg, or still-3.jpg where several are taken; the extension is the picture's own.
-std::filesystem::path NumberedPath(const std::filesystem::path& out, const std::string& extension,
-                                   int number, int count) {
-  std::filesystem::path path = out;
-  if (count > 1) path.replace_filename(fmt::format("{}-{}", out.stem().string(), number));
-  return path.replace_extension(extension);
 }
 
 Json StillJson(const Frame& frame, const std::filesystem::path& path) {
@@ -107,7 +100,7 @@ void AddLibcameraDevices(CommandSet& commands, CLI::App& device) {
   CLI::App& libcamera =
       commands.AddGroup(&device, "libcamera", "Cameras of libcamera; no daemon may be using them");
   commands.AddTo(libcamera, "list", "Every camera with its streams, sizes and controls",
-                 [](const CliContext&) { return ListCameras(); });
+                 [](const CliContext&) { return ListLibcameraCameras(); });
   auto options = std::make_shared<GrabOptions>();
   CLI::App& grab = commands.AddTo(
       libcamera, "grab", "Take stills with automatic exposure and gain off",

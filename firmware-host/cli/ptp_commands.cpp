@@ -28,7 +28,7 @@ struct PtpOptions {
   bool force = false;
 };
 
-Result<CommandOutput> ListCameras() {
+Result<CommandOutput> ListStillCameras() {
   SCAN_TRY(const auto cameras, ListPtpCameras());
   CommandOutput output{{{"cameras", Json::array()}}, ""};
   for (const CameraListing& camera : cameras) {
@@ -160,7 +160,7 @@ void AddPtpDevices(CommandSet& commands, CLI::App& device) {
   CLI::App& ptp = commands.AddGroup(
       &device, "ptp", "Tethered still cameras (libgphoto2); no daemon may be using them");
   commands.AddTo(ptp, "list", "Every camera with its port",
-                 [](const CliContext&) { return ListCameras(); });
+                 [](const CliContext&) { return ListStillCameras(); });
   const auto add = [&](const char* name, const char* what, const char* words, auto run) {
     auto options = std::make_shared<PtpOptions>();
     CLI::App& command = commands.AddTo(ptp, name, what,
