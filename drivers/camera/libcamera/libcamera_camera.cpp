@@ -14,8 +14,8 @@ namespace {
 constexpr int kMaxFrames = 40;  // looked at in one call; a camera that needs more is broken
 constexpr int kMaxDamaged = 5;
 constexpr std::int64_t kUnknownIntervalNs = 100'000'000;
-constexpr std::int64_t kLookAgainNs =
-    500'000'000;                     // for a camera that is gone; each look starts libcamera anew
+// For a camera that is gone; each look starts libcamera anew.
+constexpr std::int64_t kLookAgainNs = 500'000'000;
 constexpr double kTolerance = 0.01;  // the gate's tolerance of settings
 constexpr char kExposure[] = "ExposureTime";
 constexpr char kGain[] = "AnalogueGain";
