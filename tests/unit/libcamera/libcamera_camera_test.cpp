@@ -73,7 +73,8 @@ TEST(LibcameraCamera, TheExposureBoundHoldsForStampsThatAreLate) {
       const auto frame = bench.camera->Grab({});
       ASSERT_TRUE(frame) << ToString(frame.error());
       // The frame with this sequence number truly began here.
-      const auto begin_ns = origin_ns + static_cast<std::int64_t>(frame->sensor_sequence) * 20'000'000;
+      const auto begin_ns =
+          origin_ns + static_cast<std::int64_t>(frame->sensor_sequence) * 20'000'000;
       EXPECT_GE(begin_ns, asked_ns);
       EXPECT_LE(frame->exposure.not_before_ns, begin_ns);
     }
