@@ -46,8 +46,8 @@ struct TmcCurrents {
   double run_ma = 0;       // what the scales give, RMS
   friend bool operator==(const TmcCurrents&, const TmcCurrents&) = default;
 };
-// The largest scales that are not a thousandth above what is asked for, in the lower range where that reaches.
-// Errors: bad_input for a current that the driver cannot give with this resistor.
+// The largest scales that are not a thousandth above what is asked for, in the lower range where
+// that reaches. Errors: bad_input for a current that the driver cannot give with this resistor.
 Result<TmcCurrents> TmcCurrentsOf(const Tmc2209Config& config);
 
 // Register values of a set-up. Precondition: `config` is valid.
