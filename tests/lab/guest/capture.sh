@@ -1,6 +1,6 @@
 # Sourced by a suite: the whole station captures into /out/session. Before it: $config, and $scene, the
 # process that shows the specimen.
-until grep -q "Lab UVC" /sys/class/video4linux/*/name; do sleep 0.2; done
+[ -z "${UVC_GADGET:-}" ] || until grep -q "Lab UVC" /sys/class/video4linux/*/name; do sleep 0.2; done
 "$LAB_BIN/scanstation-motiond" --config "$config" --socket motiond.sock 2>motiond.log &
 "$LAB_BIN/scanstationd" --config "$config" --socket daemon.sock --motion-socket motiond.sock --page-port 8380 \
   2>/out/daemon.log &
