@@ -10,7 +10,7 @@ if(SCAN_WERROR)
   target_compile_options(scan_warnings INTERFACE -Werror)
 endif()
 
-# NO_UNITY: none of its files is compiled with another, as they use the same names for different
+# NO_UNITY, of each: none of its files is compiled with another, as they use the same names for different
 # things (or types of an unnamed namespace as members).
 function(scan_library name)
   cmake_parse_arguments(ARG "NO_UNITY" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
@@ -29,8 +29,11 @@ function(scan_library name)
 endfunction()
 
 function(scan_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "NO_UNITY" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
+  if(ARG_NO_UNITY)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
+  endif()
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} scan_warnings)
 endfunction()
 
