@@ -20,10 +20,11 @@ class WorkerConnection;
 struct WorkerLimits {
   std::chrono::milliseconds open{20000};
   std::chrono::milliseconds configure{5000};
-  std::chrono::milliseconds grab{15000};    // without the exposure asked for, which is added
-  std::chrono::milliseconds silence{3000};  // without a heartbeat, while a call runs
-  std::chrono::milliseconds cancel{2000};   // for a call that was cancelled to end
-  int restarts = 2;                         // in a row, within one call
+  std::chrono::milliseconds grab{15000};  // without the exposure asked for, which is added
+  std::chrono::milliseconds silence{
+      3000};  // without a heartbeat, while a call runs, after its first
+  std::chrono::milliseconds cancel{2000};  // for a call that was cancelled to end
+  int restarts = 2;                        // in a row, within one call
   std::uint64_t max_picture_bytes = 256U << 20;
 };
 

@@ -69,6 +69,7 @@ Result<WorkerMessage> WorkerConnection::Await(std::int64_t id, const char* funct
     const auto now = Clock::now();
     if (*message) {
       nlohmann::json& body = (*message)->body;
+      heard_ = true;
       if (IdIn(body, "beat") == id) silent_since = now;
       if (IdIn(body, "id") == id) {
         if (const auto error = body.find("error"); error != body.end())
@@ -80,7 +81,8 @@ Result<WorkerMessage> WorkerConnection::Await(std::int64_t id, const char* funct
         return tl::unexpected(Lose("answered nonsense (neither ok nor error)"));
       }
     }
-    if (now < deadline && now < silent_since + limits_.silence) continue;
+    // A program that is still being loaded gives no sign of life yet.
+    if (now < deadline && (!heard_ || now < silent_since + limits_.silence)) continue;
     const Error fault = Lose(now < deadline ? "gives no sign of life"
                                             : fmt::format("did not end {} in time", function));
     if (cancelled) return Cancelled(kWhere);

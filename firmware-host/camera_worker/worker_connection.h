@@ -40,6 +40,7 @@ class WorkerConnection {
   WorkerLimits limits_;
   std::int64_t next_id_ = 1;
   bool lost_ = false;
+  bool heard_ = false;  // anything from it so far
 };
 
 }  // namespace scan

@@ -1,4 +1,4 @@
-# The tethered camera through libgphoto2 in its worker: found, set, released, unplugged in mid-run.
+# The tethered camera through libgphoto2 in its worker: found, set, released, unplugged, hung.
 # limit: 600
 PTP_SCENE=()
 . "$LAB_DIR/guest/ptp.sh"
@@ -38,3 +38,22 @@ sleep 1
 plug_camera
 wait $run
 sent b-{1..6}.jpg
+
+# A worker that hangs is killed, the camera reset before the last attempt; the run goes on.
+grab --exposure-us 8000 --count 6 --out c.jpg 2>c.log &
+run=$!
+until [ -e c-2.jpg ]; do sleep 0.1; done
+for time in first second; do
+  worker=$(pgrep -n -f scanstation-camera-ptp)
+  kill -STOP "$worker"
+  while kill -0 "$worker" 2>/dev/null; do sleep 0.2; done
+done
+wait $run
+sent c-{1..6}.jpg
+cat c.log
+
+# Gone for good: a clear fault.
+unplug_camera
+! grab --out gone.jpg 2>gone
+cat gone
+grep -q "no such still camera" gone
