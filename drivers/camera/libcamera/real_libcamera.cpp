@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstring>
 #include <deque>
@@ -66,6 +67,8 @@ std::optional<double> NumberOf(const lc::ControlValue& value) {
 
 // A number as a value of the control's type; nothing where it does not fit.
 lc::ControlValue ValueOf(const lc::ControlId& id, double number) {
+  const double most = id.type() == lc::ControlTypeInteger64 ? 0x1p62 : 0x7fffffff;
+  if (!(std::abs(number) <= most)) return {};
   switch (id.type()) {
     case lc::ControlTypeBool:
       return lc::ControlValue(number != 0);

@@ -40,6 +40,19 @@ grep -q '"counted": 12.5' moved
 [ $(($(counted lift) - lift)) = 2250 ] # from -1 mm
 echo "figure: moved by hand through scanstation-motiond: 1250 and 2250 steps, as commanded"
 
+# The lamp is lit as long as its client lives, and nobody else switches it meanwhile.
+lamp() { cat "$GPIO_SYSFS/sim_gpio11/value"; }
+[ "$(lamp)" = 0 ]
+"$LAB_BIN/scanstation" device light on --socket "$sock" &
+client=$!
+until [ "$(lamp)" = 1 ]; do sleep 0.2; done
+if device light off --socket "$sock" 2>refused; then exit 1; fi
+grep -q 'another client' refused
+kill -9 $client
+until [ "$(lamp)" = 0 ]; do sleep 0.2; done
+device light on --seconds 0.1 --socket "$sock"
+[ "$(lamp)" = 0 ]
+
 # The emergency stop, seen from outside.
 device motion move --turntable-deg -1 --lift-mm 1 --socket "$sock" # near the switches: homing is short
 echo pull-up >"$GPIO_SYSFS/sim_gpio9/pull"
