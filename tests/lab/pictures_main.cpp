@@ -1,12 +1,10 @@
 // lab_pictures STATION OUT: what the camera of a station file sees at every view of its plan, with
 // the specimen and the rig's errors of [sim], for lab_scene to show. Writes OUT/N.jpg,
-// OUT/elsewhere.jpg, OUT/index
-// ("TURNTABLE LIFT PRESENT FILE", positions in steps), OUT/truth.json (for scanstation evaluate
-// --truth) and OUT/surface.ply, the exact surface.
+// OUT/elsewhere.jpg, OUT/truth.json (for scanstation evaluate --truth), OUT/surface.ply (the exact
+// surface), and last OUT/index ("TURNTABLE LIFT PRESENT FILE", positions in steps).
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "acquisition/plan/station_plan.h"
@@ -56,7 +54,7 @@ Status MakePictures(const fs::path& station, const fs::path& out) {
   SCAN_TRY(const EncodedFile elsewhere,
            EncodePicture(cv::Mat(camera.h, camera.w, CV_8UC3, cv::Scalar(255, 0, 255)), "jpg", 92));
   SCAN_CHECK(WriteFileDurably(out / "elsewhere.jpg", elsewhere.bytes));
-  std::ofstream index(out / "index");
+  std::string index;
   Json truth = {{"views", Json::object()}};
   int number = 0;
   for (const PlannedView& view : views) {
@@ -71,13 +69,14 @@ Status MakePictures(const fs::path& station, const fs::path& out) {
       SCAN_TRY(const EncodedFile jpeg, EncodePicture(picture, "jpg", 92));
       const std::string name = fmt::format("{}.jpg", number++);
       SCAN_CHECK(WriteFileDurably(out / name, jpeg.bytes));
-      index << fmt::format("{} {} {} {}\n", StepsAt(config.turntable, view.turntable_deg),
+      index += fmt::format("{} {} {} {}\n", StepsAt(config.turntable, view.turntable_deg),
                            StepsAt(config.lift, view.lift_mm), present ? 1 : 0, name);
     }
   }
   SCAN_CHECK(WriteFileDurably(out / "truth.json", truth.dump(1)));
   SCAN_TRY(const auto specimen, MakeSpecimen(config.sim.specimen));
-  return WritePly(out / "surface.ply", ExactSurface(*specimen, 0.3));
+  SCAN_CHECK(WritePly(out / "surface.ply", ExactSurface(*specimen, 0.3)));
+  return WriteFileDurably(out / "index", index);  // last: it says that all is there
 }
 
 }  // namespace

@@ -5,6 +5,8 @@ set -euo pipefail
 when=$1 scene=$2 bin=$3 run=$4 station=$5
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 if [ "$when" = before ]; then
+  mkdir -p "$(dirname "$scene")"
+  exec 9>"$scene.lock" && flock 9 # stations share a scene, and their suites run side by side
   [ "$scene/index" -nt "$here/$station.toml" ] && [ "$scene/index" -nt "$bin/lab_pictures" ] && exit
   exec "$bin/lab_pictures" "$here/$station.toml" "$scene"
 fi

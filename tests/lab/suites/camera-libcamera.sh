@@ -15,8 +15,8 @@ grep -q "control ExposureTime" list
 "$LAB_BIN/scanstation" device libcamera grab --size 640x480 --format MJPEG --exposure-us 9000 --set Brightness=0.2 \
   --out grab.jpg --json | tee grab.json
 grep -q '"sensor_timestamp": true' grab.json
-! grep -q '"exposure_us"' grab.json
-! "$LAB_BIN/scanstation" device libcamera grab --set NoSuchControl=1 --out no.jpg
+fails grep -q '"exposure_us"' grab.json
+fails "$LAB_BIN/scanstation" device libcamera grab --set NoSuchControl=1 --out no.jpg
 "$LAB_BIN/scanstation" device libcamera grab --size 640x480 --format MJPEG --count 12 --out many.jpg 2>many.log &
 many=$!
 until [ -f many-3.jpg ]; do sleep 0.05; done
@@ -27,7 +27,7 @@ grep -q "event=camera_worker_restart.*killed by signal 9" many.log
 [ "$(ls many-*.jpg | wc -l)" -eq 12 ]
 kill "$feeder"
 wait "$feeder" || true
-! "$LAB_BIN/scanstation" device libcamera grab --out gone.png 2>gone.log
+fails "$LAB_BIN/scanstation" device libcamera grab --out gone.png 2>gone.log
 cat gone.log
 grep -q "the camera is not there" gone.log
-! pgrep -f "$LAB_BIN/scanstation-camera-libcamera"
+fails pgrep -f "$LAB_BIN/scanstation-camera-libcamera"

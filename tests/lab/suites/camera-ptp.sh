@@ -26,7 +26,7 @@ grab --exposure-us 4000 --gain 2 --count 3 --out a.jpg --json >a.json
 grep -q '"exposure_us": 4000' a.json
 grep -q '"gain": 2' a.json
 sent a-{1..3}.jpg
-! grab --exposure-us 5000 --out none.jpg 2>refused
+fails grab --exposure-us 5000 --out none.jpg 2>refused
 grep -q '4000 us' refused
 
 # Unplugged and plugged in again in the middle of a run.
@@ -54,6 +54,6 @@ cat c.log
 
 # Gone for good: a clear fault.
 unplug_camera
-! grab --out gone.jpg 2>gone
+fails grab --out gone.jpg 2>gone
 cat gone
 grep -q "no such still camera" gone

@@ -13,4 +13,4 @@ export LAB_CAMERA=$port LAB_SIZE=640x480 LAB_FORMATS="MJPG YUYV" LAB_CYCLES=20
 "$LAB_BIN/scanstation" device camera controls --port "$port" | grep -q exposure_time_absolute
 kill "$feeder"
 wait "$feeder" || true
-! "$LAB_BIN/scanstation" device camera grab --port "$port" --out gone.png
+fails "$LAB_BIN/scanstation" device camera grab --port "$port" --out gone.png

@@ -30,7 +30,7 @@ grep -q '"ready": true' doctor
 start
 device gpio list | grep -q "TURNTABLE_STEP *held by 'scanstation turntable step'"
 device motion status --socket "$sock" | grep -q 'turntable *unpowered'
-if device motion move --turntable-deg 1 --lift-mm 1 --socket "$sock" 2>refused; then exit 1; fi
+fails device motion move --turntable-deg 1 --lift-mm 1 --socket "$sock" 2>refused
 grep -q 'home' refused
 device motion home --socket "$sock"
 turntable=$(counted turntable) lift=$(counted lift)
@@ -46,7 +46,7 @@ lamp() { cat "$GPIO_SYSFS/sim_gpio11/value"; }
 "$LAB_BIN/scanstation" device light on --socket "$sock" &
 client=$!
 until [ "$(lamp)" = 1 ]; do sleep 0.2; done
-if device light off --socket "$sock" 2>refused; then exit 1; fi
+fails device light off --socket "$sock" 2>refused
 grep -q 'another client' refused
 kill -9 $client
 until [ "$(lamp)" = 0 ]; do sleep 0.2; done

@@ -10,20 +10,19 @@ sed -e 's/00123456/LAB-T/; s/00123457/LAB-L/; s/driver = "v4l2"/driver = "sim"/'
 "$LAB_BIN/scanstation-motiond" --config tic.toml --socket "$PWD/motiond.sock" &
 daemon=$!
 until [ -S motiond.sock ]; do sleep 0.2; done
-refused() { if "$@"; then exit 1; fi; }
 motion() { "$LAB_BIN/scanstation" device motion "$@" --socket "$PWD/motiond.sock"; }
-refused motion move --turntable-deg 10 --lift-mm 5
+fails motion move --turntable-deg 10 --lift-mm 5
 motion home
 motion move --turntable-deg 30 --lift-mm 4
 motion status | grep -q "30.000 deg counted"
 motion status | grep -q "4.000 mm counted"
 # The boards are held: nobody else mixes in.
-refused "$LAB_BIN/scanstation" device tic status --serial LAB-L
+fails "$LAB_BIN/scanstation" device tic status --serial LAB-L
 # Unplugged and plugged in again.
 echo "" >/sys/kernel/config/usb_gadget/lift/UDC
 sleep 2
 motion status | grep -q "^lift *fault"
-refused motion move --turntable-deg 40 --lift-mm 4
+fails motion move --turntable-deg 40 --lift-mm 4
 echo dummy_udc.1 >/sys/kernel/config/usb_gadget/lift/UDC
 until "$LAB_BIN/scanstation" device tic list | grep -q LAB-L; do sleep 0.5; done
 motion home
