@@ -57,8 +57,8 @@ double CommonTurn(const PoseTrial& trial, const Poses& poses, const FreeDirectio
   return best;
 }
 
-double Nees(const ViewPose& view, const CameraFromModel& truth) {
-  const Vector6d error = MotionBetween(view.camera_from_model, truth, Eigen::Vector3d::Zero());
+double Nees(const ViewPose& view, const CameraFromModel& solved, const CameraFromModel& truth) {
+  const Vector6d error = MotionBetween(solved, truth, Eigen::Vector3d::Zero());
   // In units of the sigmas: rad and mm differ by orders of magnitude.
   const Vector6d scale = view.covariance.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Matrix6d scaled = scale.asDiagonal() * view.covariance * scale.asDiagonal();
@@ -122,7 +122,7 @@ MethodFigures ScorePoses(const PoseTrial& trial, const Poses& poses,
       moved = true;
     }
     if (moved) f.turned = ScorePose(trial.surface, trial.truth[i], PoseOf{turned, intrinsics});
-    f.nees = Nees(view, trial.truth[i].camera_from_model);
+    f.nees = Nees(view, turned, trial.truth[i].camera_from_model);
     f.centre_sigma_mm = std::sqrt(view.covariance.diagonal().tail<3>().sum());
   });
   return figures;

@@ -39,7 +39,8 @@ struct ViewFigures {
   double cost_px = 0, cost_l1_px = 0;  // Eq 3, picture reduced to 462 px
   PoseError error;                     // as found
   PoseError turned;                    // after the common turn about the free axes, see ScorePoses
-  double nees = 0;  // normalised error squared of the reported covariance, 6 degrees of freedom
+  // Normalised error squared of the reported covariance, of `turned`; 6 degrees of freedom.
+  double nees = 0;
   double centre_sigma_mm = 0;  // reported: the root of the trace of the centre's covariance
 };
 

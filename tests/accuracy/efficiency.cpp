@@ -1,4 +1,4 @@
-#include "efficiency.h"
+#include "tests/accuracy/efficiency.h"
 
 #include <tbb/parallel_for.h>
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "drivers/base/result.h"
-#include "pose_bound.h"
 #include "reconstruction/evaluate/fig12.h"
+#include "tests/accuracy/pose_bound.h"
 
 namespace scan::test {
 

@@ -1,4 +1,4 @@
-#include "pose_bound.h"
+#include "tests/accuracy/pose_bound.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

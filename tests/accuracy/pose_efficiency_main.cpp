@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "efficiency.h"
 #include "reconstruction/specimens/specimen.h"
+#include "tests/accuracy/efficiency.h"
 
 int main(int argc, char** argv) {
   using namespace scan;
