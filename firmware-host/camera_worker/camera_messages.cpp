@@ -65,6 +65,21 @@ std::string TextIn(const Json& json, const char* key) {
   return text;
 }
 
+// A fraction would be cut off, and one that is out of range be anything.
+std::int64_t WholeIn(const Json& json, const char* key) {
+  const Json& number = json.at(key);
+  if (!number.is_number_integer())
+    throw Json::type_error::create(302, std::string(key) + " is no whole number", &json);
+  return number.get<std::int64_t>();
+}
+
+std::uint64_t CountIn(const Json& json, const char* key) {
+  const Json& number = json.at(key);
+  if (!number.is_number_integer() || (!number.is_number_unsigned() && number < 0))
+    throw Json::type_error::create(302, std::string(key) + " is no count", &json);
+  return number.get<std::uint64_t>();
+}
+
 Result<UniqueFd> MemoryFile(const std::vector<std::byte>& bytes) {
   UniqueFd fd(::memfd_create("scanstation-frame", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   const auto failed = [](const char* what) {
@@ -102,8 +117,8 @@ Result<std::vector<std::byte>> ReadMemoryFile(const UniqueFd& fd, std::uint64_t 
 
 Result<ExposureBound> BoundFromJson(const Json& json) {
   ExposureBound bound;
-  bound.not_before_ns = json.at("not_before_ns").get<std::int64_t>();
-  bound.not_after_ns = json.at("not_after_ns").get<std::int64_t>();
+  bound.not_before_ns = WholeIn(json, "not_before_ns");
+  bound.not_after_ns = WholeIn(json, "not_after_ns");
   const auto name = json.at("source").get<std::string>();
   const auto source = std::find_if(kSources.begin(), kSources.end(),
                                    [&](const auto& entry) { return entry.second == name; });
@@ -134,7 +149,7 @@ Json ToJson(const std::vector<CameraListing>& cameras) {
 
 Result<CameraInfo> CameraInfoFromJson(const Json& json) {
   return Guarded<CameraInfo>("open", json, [](const Json& j) -> Result<CameraInfo> {
-    const auto w = j.at("w").get<std::int64_t>(), h = j.at("h").get<std::int64_t>();
+    const std::int64_t w = WholeIn(j, "w"), h = WholeIn(j, "h");
     if (w < 1 || h < 1 || w > kMaxSide || h > kMaxSide)
       return Malformed(fmt::format("a picture of {} x {}", w, h), "open");
     return CameraInfo{TextIn(j, "id"), TextIn(j, "model"), static_cast<int>(w),
@@ -203,15 +218,15 @@ Result<Frame> UnpackFrame(const Json& body, const std::vector<UniqueFd>& files,
     if (!stated.is_array() || stated.empty() || stated.size() != files.size())
       return Malformed("files and descriptors do not match", "grab");
     Frame frame;
-    frame.sensor_sequence = j.at("sensor_sequence").get<std::uint64_t>();
+    frame.sensor_sequence = CountIn(j, "sensor_sequence");
     SCAN_TRY(frame.exposure, BoundFromJson(j.at("exposure")));
     SCAN_TRY(frame.applied, AppliedSettingsFromJson(j.at("applied")));
     for (std::size_t i = 0; i < files.size(); ++i) {
       const auto extension = stated[i].at("extension").get<std::string>();
-      const auto bytes = stated[i].at("bytes").get<std::uint64_t>();
+      const std::uint64_t bytes = CountIn(stated[i], "bytes");
       if (std::find(kExtensions.begin(), kExtensions.end(), extension) == kExtensions.end())
         return Malformed("an unknown kind of picture file", "grab");
-      if (!stated[i].at("bytes").is_number_unsigned() || bytes == 0 || bytes > max_bytes)
+      if (bytes == 0 || bytes > max_bytes)
         return Malformed(fmt::format("a picture of {} bytes", bytes), "grab");
       SCAN_TRY(auto content, ReadMemoryFile(files[i], bytes));
       frame.files.push_back({extension, std::move(content)});

@@ -43,7 +43,7 @@ TEST(WorkerFrame, ComesThroughUnchanged) {
 }
 
 struct Damage {
-  const char* name;
+  const char *name, *refused_for;
   std::function<void(WorkerMessage&)> inflict;
 };
 
@@ -55,43 +55,62 @@ UniqueFd MemFd(std::size_t bytes, unsigned seals) {
 }
 
 const Damage kDamages[] = {
-    {"no_files", [](WorkerMessage& m) { m.files.clear(); }},
-    {"one_file_too_few", [](WorkerMessage& m) { m.files.pop_back(); }},
-    {"files_is_a_number", [](WorkerMessage& m) { m.body["files"] = 2; }},
-    {"files_holds_numbers",
+    {"no_files", "do not match", [](WorkerMessage& m) { m.files.clear(); }},
+    {"one_file_too_few", "do not match", [](WorkerMessage& m) { m.files.pop_back(); }},
+    {"files_is_a_number", "do not match", [](WorkerMessage& m) { m.body["files"] = 2; }},
+    {"files_holds_numbers", "cannot use at()",
      [](WorkerMessage& m) {
        m.body["files"] = {1, 2};
      }},
-    {"path_as_extension", [](WorkerMessage& m) { m.body["files"][0]["extension"] = "../a"; }},
-    {"extension_is_a_number", [](WorkerMessage& m) { m.body["files"][0]["extension"] = 1; }},
-    {"longer_than_the_file", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 300'001; }},
-    {"shorter_than_the_file", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 299'999; }},
-    {"huge", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 1ULL << 60; }},
-    {"negative_length", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = -1; }},
-    {"fractional_length", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 300'000.5; }},
-    {"huge_file",
+    {"path_as_extension", "kind of picture",
+     [](WorkerMessage& m) { m.body["files"][0]["extension"] = "../a"; }},
+    {"extension_is_a_number", "must be string",
+     [](WorkerMessage& m) { m.body["files"][0]["extension"] = 1; }},
+    {"longer_than_the_file", "300001 are stated",
+     [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 300'001; }},
+    {"shorter_than_the_file", "299999 are stated",
+     [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 299'999; }},
+    {"huge", "a picture of", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 1ULL << 60; }},
+    {"negative_length", "no count", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = -1; }},
+    {"empty", "a picture of 0", [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 0; }},
+    {"fractional_length", "no count",
+     [](WorkerMessage& m) { m.body["files"][0]["bytes"] = 300'000.5; }},
+    {"huge_file", "a picture of 67108864",
      [](WorkerMessage& m) {
        m.files[0] = MemFd(64 << 20, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL);
        m.body["files"][0]["bytes"] = 64 << 20;
      }},
-    {"unsealed", [](WorkerMessage& m) { m.files[0] = MemFd(300'000, 0); }},
-    {"a_pipe",
+    {"unsealed", "no sealed", [](WorkerMessage& m) { m.files[0] = MemFd(300'000, 0); }},
+    {"a_pipe", "no sealed",
      [](WorkerMessage& m) {
        int ends[2];
        ASSERT_EQ(::pipe(ends), 0);
        m.files[0].Reset(ends[0]);
        ::close(ends[1]);
      }},
-    {"a_device",
+    {"a_device", "no sealed",
      [](WorkerMessage& m) { m.files[0].Reset(::open("/dev/zero", O_RDONLY | O_CLOEXEC)); }},
-    {"unknown_source", [](WorkerMessage& m) { m.body["exposure"]["source"] = "guess"; }},
-    {"ends_before_it_begins", [](WorkerMessage& m) { m.body["exposure"]["not_after_ns"] = 1; }},
-    {"no_exposure", [](WorkerMessage& m) { m.body.erase("exposure"); }},
-    {"exposure_is_a_list", [](WorkerMessage& m) { m.body["exposure"] = Json::array(); }},
-    {"sequence_is_a_word", [](WorkerMessage& m) { m.body["sensor_sequence"] = "one"; }},
-    {"applied_is_a_word", [](WorkerMessage& m) { m.body["applied"]["gain"] = "much"; }},
-    {"applied_is_negative", [](WorkerMessage& m) { m.body["applied"]["exposure_us"] = -2; }},
-    {"applied_is_null", [](WorkerMessage& m) { m.body["applied"]["exposure_us"] = nullptr; }},
+    {"time_beyond_range", "no whole number",
+     [](WorkerMessage& m) { m.body["exposure"]["not_before_ns"] = -1e300; }},
+    {"time_is_a_fraction", "no whole number",
+     [](WorkerMessage& m) { m.body["exposure"]["not_after_ns"] = 9'100'000'000'000'000'000.0; }},
+    {"unknown_source", "unknown source",
+     [](WorkerMessage& m) { m.body["exposure"]["source"] = "guess"; }},
+    {"ends_before_it_begins", "ends before",
+     [](WorkerMessage& m) { m.body["exposure"]["not_after_ns"] = 1; }},
+    {"no_exposure", "exposure", [](WorkerMessage& m) { m.body.erase("exposure"); }},
+    {"exposure_is_a_list", "cannot use at()",
+     [](WorkerMessage& m) { m.body["exposure"] = Json::array(); }},
+    {"sequence_is_negative", "no count", [](WorkerMessage& m) { m.body["sensor_sequence"] = -1; }},
+    {"sequence_beyond_range", "no count",
+     [](WorkerMessage& m) { m.body["sensor_sequence"] = 1e300; }},
+    {"sequence_is_a_word", "no count", [](WorkerMessage& m) { m.body["sensor_sequence"] = "one"; }},
+    {"applied_is_a_word", "gain is no number",
+     [](WorkerMessage& m) { m.body["applied"]["gain"] = "much"; }},
+    {"applied_is_negative", "no number",
+     [](WorkerMessage& m) { m.body["applied"]["exposure_us"] = -2; }},
+    {"applied_is_null", "no number",
+     [](WorkerMessage& m) { m.body["applied"]["exposure_us"] = nullptr; }},
 };
 
 class DamagedFrame : public ::testing::TestWithParam<Damage> {};
@@ -103,6 +122,8 @@ TEST_P(DamagedFrame, IsRefused) {
   const auto frame = UnpackFrame(packed->body, packed->files, 1 << 20);
   ASSERT_FALSE(frame);
   EXPECT_EQ(frame.error().kind, ErrorKind::bad_input);
+  EXPECT_NE(frame.error().what.find(GetParam().refused_for), std::string::npos)
+      << frame.error().what;
 }
 
 INSTANTIATE_TEST_SUITE_P(All, DamagedFrame, ::testing::ValuesIn(kDamages),
@@ -139,7 +160,12 @@ const Peer kPeers[] = {
      }},
     {"info_of_nonsense_size",
      [](int socket, std::int64_t id) {
-       const Json info = {{"id", "a"}, {"model", "b"}, {"w", -4}, {"h", 1e9}};
+       const Json info = {{"id", "a"}, {"model", "b"}, {"w", -4}, {"h", 1'000'000'000}};
+       SendText(socket, Json{{"id", id}, {"ok", info}}.dump());
+     }},
+    {"info_of_a_size_beyond_range",
+     [](int socket, std::int64_t id) {
+       const Json info = {{"id", "a"}, {"model", "b"}, {"w", 1e300}, {"h", 80}};
        SendText(socket, Json{{"id", id}, {"ok", info}}.dump());
      }},
     {"many_descriptors",
