@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
+#include <cstring>
 
 #include "drivers/base/unique_fd.h"
 #include "firmware-host/protocol/rpc.h"
@@ -69,7 +71,9 @@ Result<Json> RunWorkerTool(const std::filesystem::path& program,
     const auto left =
         std::chrono::duration_cast<std::chrono::milliseconds>(deadline - SteadyClock::now());
     pollfd output{spawned.output.get(), POLLIN, 0};
-    if (left.count() <= 0 || poll(&output, 1, static_cast<int>(left.count())) == 0) break;
+    const int ready = left.count() > 0 ? poll(&output, 1, static_cast<int>(left.count())) : 0;
+    if (ready == 0) break;
+    if (ready < 0) continue;  // a signal: reading now could wait for ever
     std::array<char, 4096> buffer{};
     const ssize_t size = read(spawned.output.get(), buffer.data(), buffer.size());
     if (size > 0) text.append(buffer.data(), static_cast<std::size_t>(size));
