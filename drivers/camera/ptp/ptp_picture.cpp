@@ -20,10 +20,17 @@ std::size_t ByteAt(std::span<const std::byte> bytes, std::size_t at) {
   return std::to_integer<std::size_t>(bytes[at]);
 }
 
-// Width and height by the first frame header (ISO 10918-1, B.2.2); the thumbnail of the EXIF data
-// lies within a segment and is passed over with it.
-std::optional<std::pair<int, int>> JpegSize(std::span<const std::byte> bytes) {
+struct JpegLayout {
+  std::optional<std::pair<int, int>> size;
+  std::size_t scan_at = 0;  // of the compressed data
+};
+
+// Size by the first frame header (ISO 10918-1, B.2.2), and where the first scan begins; the
+// thumbnail of the EXIF data lies within a segment before and is passed over with it. Nothing where
+// there is no scan.
+std::optional<JpegLayout> JpegLayoutOf(std::span<const std::byte> bytes) {
   if (bytes.size() < 4 || ByteAt(bytes, 0) != 0xff || ByteAt(bytes, 1) != 0xd8) return std::nullopt;
+  JpegLayout layout;
   std::size_t at = 2;
   while (at + 9 < bytes.size() && ByteAt(bytes, at) == 0xff) {
     const std::size_t marker = ByteAt(bytes, at + 1);
@@ -31,19 +38,25 @@ std::optional<std::pair<int, int>> JpegSize(std::span<const std::byte> bytes) {
       ++at;
       continue;
     }
-    if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) {
+    const bool frame_header =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    if (frame_header && !layout.size) {
       const auto h = ByteAt(bytes, at + 5) << 8 | ByteAt(bytes, at + 6);
       const auto w = ByteAt(bytes, at + 7) << 8 | ByteAt(bytes, at + 8);
-      return std::pair(static_cast<int>(w), static_cast<int>(h));
+      layout.size = std::pair(static_cast<int>(w), static_cast<int>(h));
     }
-    if (marker == 0xda || marker == 0xd9) return std::nullopt;
+    if (marker == 0xd9) return std::nullopt;
     at += 2 + (ByteAt(bytes, at + 2) << 8 | ByteAt(bytes, at + 3));
+    layout.scan_at = at;
+    if (marker == 0xda) return layout;
   }
   return std::nullopt;
 }
 
-bool JpegEnds(std::span<const std::byte> bytes) {
-  const std::size_t last = bytes.size() > kPadding ? bytes.size() - kPadding : 2;
+// A thumbnail's end, before the scan, is not the picture's.
+bool JpegEnds(std::span<const std::byte> bytes, std::size_t scan_at) {
+  const std::size_t last =
+      std::max(scan_at + 1, bytes.size() > kPadding ? bytes.size() - kPadding : 0);
   for (std::size_t at = bytes.size(); at-- > last;) {
     if (ByteAt(bytes, at) == 0xd9 && ByteAt(bytes, at - 1) == 0xff) return true;
   }
@@ -95,8 +108,10 @@ Status CheckPicture(const EncodedFile& file, int w, int h, const std::string& wh
     if (!IsTiff(file.bytes)) return fault(fmt::format("the {} file is damaged", file.extension));
     return {};
   }
-  const auto size = JpegSize(file.bytes);
-  if (!size || !JpegEnds(file.bytes)) return fault("the JPEG is damaged or cut off");
+  const auto layout = JpegLayoutOf(file.bytes);
+  if (!layout || !layout->size || !JpegEnds(file.bytes, layout->scan_at))
+    return fault("the JPEG is damaged or cut off");
+  const auto size = layout->size;
   if (w > 0 && *size != std::pair(w, h))
     return DeviceFault(
         fmt::format("the JPEG has {} x {} pixels, not {} x {}", size->first, size->second, w, h),

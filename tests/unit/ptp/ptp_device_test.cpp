@@ -128,6 +128,21 @@ TEST(Pictures, AJpegIsWholeAndOfItsSize) {
   EXPECT_FALSE(CheckPicture({"nef", whole.bytes}, 64, 48, ""));
 }
 
+TEST(Pictures, TheEndOfAThumbnailIsNotThePictures) {
+  std::vector<std::byte> picture = SimDslrJpeg(1);
+  const std::vector<std::byte> thumbnail = SimDslrJpeg(2);
+  std::vector<std::byte> segment{std::byte{0xff}, std::byte{0xe1},
+                                 static_cast<std::byte>((thumbnail.size() + 2) >> 8),
+                                 static_cast<std::byte>((thumbnail.size() + 2) & 0xff)};
+  segment.insert(segment.end(), thumbnail.begin(), thumbnail.end());
+  picture.insert(picture.begin() + 2, segment.begin(), segment.end());
+  EXPECT_TRUE(CheckPicture({"jpg", picture}, 64, 48, ""));
+  for (std::size_t size = 0; size < picture.size(); ++size) {
+    const EncodedFile cut{"jpg", {picture.begin(), picture.begin() + static_cast<long>(size)}};
+    EXPECT_FALSE(CheckPicture(cut, 64, 48, "")) << size;
+  }
+}
+
 TEST(GpioShutter, PressesAndHears) {
   auto clock = std::make_shared<VirtualClock>();
   auto board =
