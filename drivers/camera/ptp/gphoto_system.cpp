@@ -158,9 +158,19 @@ int SetWidget(CameraWidget* widget, CameraWidgetType type, const std::string& va
     if (code != std::errc() || at != value.data() + value.size()) return GP_ERROR_BAD_PARAMETERS;
     return gp_widget_set_value(widget, &number);
   };
-  if (type == GP_WIDGET_RANGE) return parse(0.0F);
-  if (type == GP_WIDGET_TOGGLE || type == GP_WIDGET_DATE) return parse(0);
-  return gp_widget_set_value(widget, value.c_str());
+  switch (type) {
+    case GP_WIDGET_RANGE:
+      return parse(0.0F);
+    case GP_WIDGET_TOGGLE:
+    case GP_WIDGET_DATE:
+      return parse(0);
+    case GP_WIDGET_TEXT:
+    case GP_WIDGET_RADIO:
+    case GP_WIDGET_MENU:
+      return gp_widget_set_value(widget, value.c_str());
+    default:  // a button's value is the address of a function
+      return GP_ERROR_BAD_PARAMETERS;
+  }
 }
 
 class GphotoCamera final : public PhotoCamera {
