@@ -134,7 +134,7 @@ Result<T> PtpCamera::WithRecovery(std::stop_token stop, Work work) {
   for (bool again = false;; again = true) {
     SCAN_CHECK(EnsureOpen(stop));
     Result<T> result = work();
-    if (result || again || !camera_->broken()) return result;
+    if (result || again || !camera_->broken() || stop.stop_requested()) return result;
   }
 }
 
