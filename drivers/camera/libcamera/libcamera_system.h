@@ -68,7 +68,7 @@ class LibcameraDevice {
   // `format` and size are among the offers. Errors also: bad_input when the camera adjusts them.
   virtual Result<LibcameraStream> Configure(LibcameraRole role, const std::string& format, int w,
                                             int h) = 0;
-  // The ranges of its numeric controls by libcamera's name. Precondition: configured.
+  // The ranges of its numeric controls by libcamera's name; they may change when it is configured.
   virtual std::map<std::string, LibcameraRange> Controls() = 0;
   // `fixed` goes with every request. Errors also: bad_input for controls that it has not.
   virtual Status Start(const std::map<std::string, std::string>& fixed) = 0;

@@ -69,6 +69,7 @@ std::optional<double> NumberOf(const lc::ControlValue& value) {
 lc::ControlValue ValueOf(const lc::ControlId& id, double number) {
   const double most = id.type() == lc::ControlTypeInteger64 ? 0x1p62 : 0x7fffffff;
   if (!(std::abs(number) <= most)) return {};
+  if (id.type() != lc::ControlTypeFloat && number != std::trunc(number)) return {};
   switch (id.type()) {
     case lc::ControlTypeBool:
       return lc::ControlValue(number != 0);
@@ -283,7 +284,8 @@ class RealDevice final : public LibcameraDevice {
     if (settings.lock_automatics && Has(lc::controls::AeEnable))
       controls.set(lc::controls::AeEnable, false);
     if (settings.exposure_us && Has(lc::controls::ExposureTime))
-      controls.set(lc::controls::ExposureTime, static_cast<std::int32_t>(*settings.exposure_us));
+      controls.set(lc::controls::ExposureTime,
+                   static_cast<std::int32_t>(std::lround(*settings.exposure_us)));
     if (settings.gain && Has(lc::controls::AnalogueGain))
       controls.set(lc::controls::AnalogueGain, static_cast<float>(*settings.gain));
     if (const int code = camera_->queueRequest(&queued); code < 0)
