@@ -132,8 +132,10 @@ class CallLane {
     } else {
       answer.body["error"] = ErrorToJson(result.error());
     }
-    if (const Status sent = link_.Send(answer); !sent)
-      Log(LogLevel::warning, "answer_lost", {{"error", ToString(sent.error())}});
+    Status sent = link_.Send(answer);
+    if (!sent && sent.error().kind == ErrorKind::bad_input)  // too long: that can be said
+      sent = link_.Send({{{"id", id}, {"error", ErrorToJson(sent.error())}}, {}});
+    if (!sent) Log(LogLevel::warning, "answer_lost", {{"error", ToString(sent.error())}});
   }
 
   WorkerLink& link_;
