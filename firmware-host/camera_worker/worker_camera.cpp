@@ -43,29 +43,31 @@ Result<T> WorkerCamera::WithWorker(const char* doing, std::stop_token stop, Use 
       fault.what += fmt::format(" (given up after {} restarts)", restart);
       return tl::unexpected(std::move(fault));
     }
-    SCAN_CHECK(Recover(result.error(), doing, restart + 1));
+    Recover(result.error(), doing, restart + 1);
   }
 }
 
-Status WorkerCamera::Recover(const Error& fault, const char* doing, int restart) {
+void WorkerCamera::Recover(const Error& fault, const char* doing, int restart) {
   Log(LogLevel::warning, "camera_worker_restart",
       {{"camera", options_.id},
        {"doing", doing},
        {"fault", ToString(fault)},
        {"restart", fmt::format("{} of {}", restart, options_.limits.restarts)}});
   ++restarts_;
-  if (restart < options_.limits.restarts || !options_.on_hang) return {};
+  if (restart < options_.limits.restarts || !options_.on_hang) return;
+  // Where the reset fails the last restart still has its chance.
   const Status reset = options_.on_hang();
   Log(LogLevel::warning, "camera_reset",
       {{"camera", options_.id}, {"outcome", reset ? "done" : ToString(reset.error())}});
-  return {};  // where the reset failed the last restart still has its chance
 }
 
 Status WorkerCamera::EnsureConnected(std::stop_token stop) {
   if (connection_) return {};
   SCAN_TRY(auto connection, WorkerConnection::Start(launch_, options_.limits));
+  const bool first = info_.w == 0 && !options_.first_options.empty();
+  const std::string& options = first ? options_.first_options : options_.options;
   SCAN_TRY(const WorkerMessage opened,
-           connection->Call("open", {{"options", options_.options}}, options_.limits.open, stop));
+           connection->Call("open", {{"options", options}}, options_.limits.open, stop));
   Result<CameraInfo> info = CameraInfoFromJson(opened.body);
   if (!info)
     return tl::unexpected(connection->Lose("answered nonsense: " + ToString(info.error())));

@@ -31,6 +31,9 @@ struct WorkerLimits {
 struct WorkerCameraOptions {
   std::string id;       // of the camera in the session
   std::string options;  // for CameraWorkerRole::open
+  // The same until the camera has been opened once: one that never was there is not waited for.
+  // Empty: as `options`.
+  std::string first_options;
   WorkerLimits limits;
   // The last step of recovery: called before the last restart of a worker that hung or whose
   // camera does not work, to reset the device (drivers/usb). What it gives is logged. May be empty.
@@ -62,7 +65,7 @@ class WorkerCamera final : public Camera {
   template <class T, class Use>
   Result<T> WithWorker(const char* doing, std::stop_token stop, Use use);
   Status EnsureConnected(std::stop_token stop);
-  Status Recover(const Error& fault, const char* doing, int restart);
+  void Recover(const Error& fault, const char* doing, int restart);
   Result<AppliedSettings> SendSettings(const CameraSettings& settings);
 
   WorkerCameraOptions options_;

@@ -30,6 +30,9 @@ Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options) {
   WorkerCameraOptions worker;
   worker.id = options.id;
   worker.options = ToWorkerOptions(options);
+  LibcameraOptions first = options;
+  first.config.reconnect_ms = 0;
+  worker.first_options = ToWorkerOptions(first);
   // The driver's own limits come first: they say more about what is wrong.
   worker.limits.open += WholeMs(options.config.reconnect_ms);
   worker.limits.configure += WholeMs(options.config.reconnect_ms);

@@ -11,9 +11,9 @@
 
 namespace scan {
 
-// The worker's time limits follow those of the configuration. A UVC camera, whose id
-// names vendor and product, is reset before the last attempt at recovery where it is the only one.
-// Errors: as WorkerCamera::Open.
+// The worker's time limits follow those of the configuration; a camera that is not there at first
+// is not waited for. A UVC camera, whose id names vendor and product, is reset before the last
+// attempt at recovery where it is the only one. Errors: as WorkerCamera::Open.
 Result<std::unique_ptr<Camera>> OpenLibcamera(const LibcameraOptions& options);
 
 // Errors: as ListWorkerCameras.

@@ -44,6 +44,16 @@ Result<double> UseOnce(WorkerCamera& camera) {
   return frame.applied.exposure_us.value_or(0);
 }
 
+// Grabs; the cancel comes while it waits for the frame.
+Result<Frame> GrabAndCancel(WorkerCamera& camera) {
+  std::stop_source stop;
+  const std::jthread canceller([&] {
+    std::this_thread::sleep_for(50ms);
+    stop.request_stop();
+  });
+  return camera.Grab(stop.get_token());
+}
+
 TEST(WorkerCamera, RunsTheCameraOfAnotherProcess) {
   auto camera = WorkerCamera::Open(OptionsFor({}), TestWorkerProgram());
   ASSERT_TRUE(camera) << ToString(camera.error());
@@ -118,16 +128,25 @@ TEST(WorkerCamera, GivesUpAfterSoManyRestartsAndResetsTheDeviceBeforeTheLast) {
   EXPECT_EQ(lives_at_reset, 2);
 }
 
+TEST(WorkerCamera, IsOpenedDifferentlyForTheFirstTimeAndAsWrittenFromThenOn) {
+  const TempFolder folder;
+  const auto counted = [&](const char* name) { return (folder.path() / name).string(); };
+  auto options = OptionsFor({.lives = counted("later")});
+  options.first_options = Written({.fault = "die", .at_call = 3, .lives = counted("first")});
+  auto camera = WorkerCamera::Open(options, TestWorkerProgram());
+  ASSERT_TRUE(camera) << ToString(camera.error());
+  EXPECT_EQ(LivesIn(counted("later")), 0);
+  const auto exposure_us = UseOnce(**camera);
+  ASSERT_TRUE(exposure_us) << ToString(exposure_us.error());
+  EXPECT_EQ(LivesIn(counted("first")), 1);
+  EXPECT_GE(LivesIn(counted("later")), 1);
+}
+
 TEST(WorkerCamera, ACancelReachesTheWorker) {
   auto camera =
       WorkerCamera::Open(OptionsFor({.frame_interval_us = 60'000'000}), TestWorkerProgram());
   ASSERT_TRUE(camera) << ToString(camera.error());
-  std::stop_source stop;
-  std::jthread canceller([&] {
-    std::this_thread::sleep_for(50ms);
-    stop.request_stop();
-  });
-  const auto frame = (*camera)->Grab(stop.get_token());
+  const auto frame = GrabAndCancel(**camera);
   ASSERT_FALSE(frame);
   EXPECT_EQ(frame.error().kind, ErrorKind::cancelled);
   EXPECT_TRUE((*camera)->Configure({}));
@@ -140,12 +159,7 @@ TEST(WorkerCamera, ACancelThatTheWorkerIgnoresEndsTheWorker) {
   options.limits.cancel = 200ms;
   auto camera = WorkerCamera::Open(options, TestWorkerProgram());
   ASSERT_TRUE(camera) << ToString(camera.error());
-  std::stop_source stop;
-  std::jthread canceller([&] {
-    std::this_thread::sleep_for(50ms);
-    stop.request_stop();
-  });
-  const auto frame = (*camera)->Grab(stop.get_token());
+  const auto frame = GrabAndCancel(**camera);
   ASSERT_FALSE(frame);
   EXPECT_EQ(frame.error().kind, ErrorKind::cancelled);
 }
