@@ -24,7 +24,8 @@ void PowerReadback::Run(std::stop_token stop) {
   while (changed_.wait(lock, stop, [this] { return Contradicts(); })) {
     const bool cut = changed_.wait_for(lock, stop, std::chrono::nanoseconds(limit_ns_),
                                        [this] { return !Contradicts(); });
-    if (cut || stop.stop_requested()) continue;
+    if (stop.stop_requested()) return;  // a wait that was stopped still says what holds
+    if (cut) continue;
     lock.unlock();
     report_(true);
     lock.lock();
