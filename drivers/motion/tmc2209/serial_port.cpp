@@ -23,7 +23,7 @@ class KernelSerialPort final : public SerialPort {
     while (!bytes.empty()) {
       const ssize_t n = ::write(fd_.get(), bytes.data(), bytes.size());
       if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) return Fault("cannot write");
+      if (n < 0) return Fault("cannot write", std::strerror(errno));
       bytes = bytes.subspan(static_cast<std::size_t>(n));
     }
     return {};
@@ -36,11 +36,12 @@ class KernelSerialPort final : public SerialPort {
       pollfd descriptor{fd_.get(), POLLIN, 0};
       const int ready = ::poll(&descriptor, 1, timeout_ms);
       if (ready < 0 && errno == EINTR) continue;
-      if (ready < 0) return Fault("cannot wait");
+      if (ready < 0) return Fault("cannot wait", std::strerror(errno));
       if (ready == 0) break;
       const ssize_t n = ::read(fd_.get(), bytes.data() + done, count - done);
       if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) return Fault("cannot read");
+      if (n < 0) return Fault("cannot read", std::strerror(errno));
+      if (n == 0) return Fault("cannot read", "the line has gone");
       done += static_cast<std::size_t>(n);
     }
     bytes.resize(done);
@@ -48,13 +49,13 @@ class KernelSerialPort final : public SerialPort {
   }
 
   Status Discard() override {
-    if (::tcflush(fd_.get(), TCIFLUSH) != 0) return Fault("cannot flush");
+    if (::tcflush(fd_.get(), TCIFLUSH) != 0) return Fault("cannot flush", std::strerror(errno));
     return {};
   }
 
  private:
-  tl::unexpected<Error> Fault(const char* what) const {
-    return DeviceFault(fmt::format("{}: {}", what, std::strerror(errno)), "serial " + path_,
+  tl::unexpected<Error> Fault(const char* what, const char* why) const {
+    return DeviceFault(fmt::format("{}: {}", what, why), "serial " + path_,
                        "check that the adapter is still there, then start again");
   }
 
@@ -68,12 +69,13 @@ Result<std::unique_ptr<SerialPort>> OpenSerialPort(const std::string& path) {
   const auto fault = [&](const char* what, const char* mend) {
     return DeviceFault(fmt::format("{}: {}", what, std::strerror(errno)), "serial " + path, mend);
   };
-  UniqueFd fd(::open(path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
+  // Non-blocking for the open alone: it would else wait for a carrier that nobody gives.
+  UniqueFd fd(::open(path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK));
   if (!fd) {
-    return fault("cannot open the serial line",
-                 errno == EACCES
-                     ? "add this user to the group of that file (dialout)"
-                     : "name one that is there ('ls /dev/serial/by-path /dev/ttyAMA*')");
+    const char* mend = "name one that is there ('ls /dev/serial/by-path /dev/ttyAMA*')";
+    if (errno == EACCES) mend = "add this user to the group of that file (dialout)";
+    if (errno == EBUSY) mend = "end the program that has it (scanstation-motiond, or a console)";
+    return fault("cannot open the serial line", mend);
   }
   termios line{};
   if (::tcgetattr(fd.get(), &line) != 0) return fault("is no serial line", "name another");
@@ -88,6 +90,7 @@ Result<std::unique_ptr<SerialPort>> OpenSerialPort(const std::string& path) {
   if (::tcsetattr(fd.get(), TCSANOW, &line) != 0) {
     return fault("cannot set 115200 baud", "name a line that can");
   }
+  if (::fcntl(fd.get(), F_SETFL, 0) != 0) return fault("cannot wait for the line", "name another");
   return std::make_unique<KernelSerialPort>(std::move(fd), path);
 }
 
