@@ -11,8 +11,6 @@
 namespace scan {
 namespace {
 
-constexpr std::uint8_t kSync = 0x05, kWriteBit = 0x80;
-
 class MemoryPort final : public SerialPort {
  public:
   explicit MemoryPort(std::shared_ptr<SimTmc2209Line> line) : line_(std::move(line)) {}
@@ -107,9 +105,9 @@ std::vector<std::uint8_t> SimTmc2209Line::Exchange(std::span<const std::uint8_t>
   std::vector<std::uint8_t> back(sent.begin(), sent.end());
   received_.insert(received_.end(), sent.begin(), sent.end());
   for (;;) {
-    while (!received_.empty() && received_[0] != kSync) received_.erase(received_.begin());
+    while (!received_.empty() && received_[0] != kTmcSync) received_.erase(received_.begin());
     if (received_.size() < 4) return back;
-    const std::size_t length = received_[2] & kWriteBit ? 8 : 4;
+    const std::size_t length = received_[2] & kTmcWriteBit ? 8 : 4;
     if (received_.size() < length) return back;
     const auto reply = Answer(std::span(received_).first(length));
     back.insert(back.end(), reply.begin(), reply.end());
@@ -123,7 +121,7 @@ std::vector<std::uint8_t> SimTmc2209Line::Answer(std::span<const std::uint8_t> r
   if (request[1] >= drivers_.size() || TmcCrc(request.first(last)) != request[last]) return {};
   Driver& driver = drivers_[request[1]];
   if (!driver.there || lost_.Hits(requests_)) return {};
-  const auto reg = static_cast<std::uint8_t>(request[2] & ~kWriteBit);
+  const auto reg = static_cast<std::uint8_t>(request[2] & ~kTmcWriteBit);
   if (request.size() == 8) {
     std::uint32_t value = 0;
     for (const std::uint8_t byte : request.subspan(3, 4)) value = value << 8 | byte;

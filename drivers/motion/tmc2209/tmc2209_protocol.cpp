@@ -10,9 +10,7 @@
 namespace scan {
 namespace {
 
-constexpr std::uint8_t kSync = 0x05;
 constexpr std::uint8_t kMaster = 0xff;
-constexpr std::uint8_t kWriteBit = 0x80;
 constexpr double kSourceOhm = 0.02;  // of the chip itself, in series with the sense resistor
 constexpr double kHighRangeV = 0.325, kLowRangeV = 0.18;
 
@@ -49,7 +47,7 @@ std::uint8_t TmcCrc(std::span<const std::uint8_t> bytes) {
 }
 
 std::array<std::uint8_t, 4> TmcReadRequest(int address, TmcRegister reg) {
-  std::array<std::uint8_t, 4> bytes{kSync, static_cast<std::uint8_t>(address),
+  std::array<std::uint8_t, 4> bytes{kTmcSync, static_cast<std::uint8_t>(address),
                                     static_cast<std::uint8_t>(reg), 0};
   bytes[3] = TmcCrc(std::span(bytes).first(3));
   return bytes;
@@ -57,22 +55,22 @@ std::array<std::uint8_t, 4> TmcReadRequest(int address, TmcRegister reg) {
 
 std::array<std::uint8_t, 8> TmcWriteRequest(int address, TmcRegister reg, std::uint32_t value) {
   std::array<std::uint8_t, 8> bytes{
-      kSync, static_cast<std::uint8_t>(address),
-      static_cast<std::uint8_t>(static_cast<std::uint8_t>(reg) | kWriteBit)};
+      kTmcSync, static_cast<std::uint8_t>(address),
+      static_cast<std::uint8_t>(static_cast<std::uint8_t>(reg) | kTmcWriteBit)};
   PutValue(std::span(bytes).subspan(3, 4), value);
   bytes[7] = TmcCrc(std::span(bytes).first(7));
   return bytes;
 }
 
 std::array<std::uint8_t, 8> TmcReply(TmcRegister reg, std::uint32_t value) {
-  std::array<std::uint8_t, 8> bytes{kSync, kMaster, static_cast<std::uint8_t>(reg)};
+  std::array<std::uint8_t, 8> bytes{kTmcSync, kMaster, static_cast<std::uint8_t>(reg)};
   PutValue(std::span(bytes).subspan(3, 4), value);
   bytes[7] = TmcCrc(std::span(bytes).first(7));
   return bytes;
 }
 
 std::optional<std::uint32_t> TmcReplyValue(std::span<const std::uint8_t> reply, TmcRegister reg) {
-  if (reply.size() != 8 || reply[0] != kSync || reply[1] != kMaster ||
+  if (reply.size() != 8 || reply[0] != kTmcSync || reply[1] != kMaster ||
       reply[2] != static_cast<std::uint8_t>(reg) || reply[7] != TmcCrc(reply.first(7))) {
     return std::nullopt;
   }

@@ -14,7 +14,9 @@
 namespace scan {
 
 constexpr int kTmcMaxAddresses = 4;
-constexpr std::int64_t kTmcCounts = 1024;  // of MSCNT, in one turn of the current: 4 full steps
+constexpr std::uint8_t kTmcSync = 0x05;      // first byte of every datagram
+constexpr std::uint8_t kTmcWriteBit = 0x80;  // of the register's byte
+constexpr std::int64_t kTmcCounts = 1024;    // of MSCNT, in one turn of the current: 4 full steps
 
 enum class TmcRegister : std::uint8_t {
   gconf = 0x00,

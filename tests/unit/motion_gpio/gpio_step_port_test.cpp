@@ -8,7 +8,7 @@
 namespace scan {
 namespace {
 
-enum Line : unsigned { kStep, kDir, kEn, kBrake, kStop };
+enum PortLine : unsigned { kStep, kDir, kEn, kBrake, kStop };
 
 struct Event {
   unsigned line;
@@ -16,8 +16,8 @@ struct Event {
   std::int64_t ns;
 };
 
-struct Bench {
-  Bench() {
+struct PortBench {
+  PortBench() {
     board->Listen([this](unsigned line, bool high) {
       events.push_back({line, high, clock->Now().mono_ns});
     });
@@ -46,14 +46,14 @@ struct Bench {
 };
 
 TEST(GpioStepPort, StartsWithoutCurrentAndBraked) {
-  Bench bench;
+  PortBench bench;
   EXPECT_TRUE(bench.board->Level("EN")) << "active is low";
   EXPECT_TRUE(bench.board->Level("BRAKE"));
   EXPECT_FALSE(bench.board->Level("STEP"));
 }
 
 TEST(GpioStepPort, KeepsSetUpHoldAndPulseTimes) {
-  Bench bench;
+  PortBench bench;
   ASSERT_TRUE(bench.port->Enable(true));
   const std::int64_t enabled_ns = bench.clock->Now().mono_ns;
   bench.events.clear();
@@ -88,7 +88,7 @@ TEST(GpioStepPort, KeepsSetUpHoldAndPulseTimes) {
 
 TEST(GpioStepPort, EveryFailingLineCallIsReported) {
   for (std::int64_t nth = 1;; ++nth) {
-    Bench bench;
+    PortBench bench;
     bench.board->FailAt(nth);
     const bool done = bench.port->Enable(true) && bench.port->Brake(false) &&
                       bench.port->SetDirection(true) && bench.port->EmitEdge(0);
@@ -103,7 +103,7 @@ TEST(GpioStepPort, EveryFailingLineCallIsReported) {
 }
 
 TEST(GpioStepPort, AfterAFailedCallTheSafeLevelIsWrittenAnyway) {
-  Bench bench;
+  PortBench bench;
   bench.board->FailAt(1);
   EXPECT_FALSE(bench.port->Enable(true));  // who knows whether the line heard it
   EXPECT_FALSE(bench.port->Brake(false));
@@ -119,7 +119,7 @@ TEST(GpioStepPort, AfterAFailedCallTheSafeLevelIsWrittenAnyway) {
 }
 
 TEST(GpioStepPort, ABrakeFallsInWhenThePortGoes) {
-  Bench bench;
+  PortBench bench;
   ASSERT_TRUE(bench.port->Enable(true));
   ASSERT_TRUE(bench.port->Brake(false));
   bench.events.clear();
@@ -130,7 +130,7 @@ TEST(GpioStepPort, ABrakeFallsInWhenThePortGoes) {
 }
 
 TEST(InputWatch, ASwitchThatDoesNotRestIsAFaultUntilForgiven) {
-  Bench bench;
+  PortBench bench;
   const auto wait = [&](auto done) {
     while (!done()) SystemClock().SleepFor(1'000'000);
   };
@@ -149,7 +149,7 @@ TEST(InputWatch, ASwitchThatDoesNotRestIsAFaultUntilForgiven) {
 }
 
 TEST(InputWatch, ALineThatFailsIsActiveAndSaysSo) {
-  Bench bench;
+  PortBench bench;
   std::atomic<bool> told{false};
   bench.watch->Listen([&](std::size_t, bool active) { told = told || active; });
   bench.board->FailAt(1);
