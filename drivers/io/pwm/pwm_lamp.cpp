@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <mutex>
@@ -30,16 +31,18 @@ class PwmLamp final : public Lamp {
                       "export the channel"));
     }
     SCAN_CHECK(WaitForRights(clock));
-    // The kernel refuses a duty cycle above the period, also in passing; a fresh channel has none.
-    const auto period = files_->Read(output_ + "/period");
-    if (period && *period != "0") SCAN_CHECK(Set("duty_cycle", "0"));
+    // The kernel refuses a duty cycle above the period, also in passing, and anything but a period
+    // where there is none yet (a fresh channel). So darkness comes before a period that it fits.
+    const std::int64_t dark_ns = config_.active_low ? period_ns_ : 0;
+    const std::int64_t old_ns = PeriodNs();
+    if (old_ns > 0 && old_ns >= dark_ns) SCAN_CHECK(Set("duty_cycle", std::to_string(dark_ns)));
+    SCAN_CHECK(Set("period", std::to_string(period_ns_)));
+    SCAN_CHECK(SetLevel(0));
     const auto polarity = files_->Read(output_ + "/polarity");
     if (polarity && *polarity == "inversed") {  // changes while disabled only
       SCAN_CHECK(Set("enable", "0"));
       SCAN_CHECK(Set("polarity", "normal"));
     }
-    SCAN_CHECK(Set("period", std::to_string(period_ns_)));
-    SCAN_CHECK(SetLevel(0));
     return Set("enable", "1");
   }
 
@@ -64,6 +67,13 @@ class PwmLamp final : public Lamp {
       mend = "give this user the files below /sys/class/pwm (a udev rule with GROUP=\"gpio\")";
     }
     return DeviceFault(fmt::format("cannot {}: {}", what, std::strerror(error)), Where(), mend);
+  }
+  std::int64_t PeriodNs() {  // of the channel as it was found; 0: none
+    std::int64_t ns = 0;
+    if (const auto text = files_->Read(output_ + "/period")) {
+      std::from_chars(text->data(), text->data() + text->size(), ns);
+    }
+    return ns;
   }
   Status Set(const char* attribute, const std::string& value) {
     return Done(files_->Write(output_ + "/" + attribute, value),

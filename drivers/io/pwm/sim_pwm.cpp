@@ -75,6 +75,7 @@ int SimPwm::Set(Channel& channel, const std::string& attribute, const std::strin
   if (attribute == "polarity") {
     if (value != "normal" && value != "inversed") return EINVAL;
     if (channel.enabled) return EBUSY;
+    if (channel.period_ns == 0) return EINVAL;
     next.inversed = value == "inversed";
     channel = next;
     return 0;

@@ -9,8 +9,9 @@
 
 namespace scan {
 
-// Refuses what the kernel refuses: a duty cycle above the period, a period of nothing, another
-// polarity while enabled, a channel that it does not have or that is taken.
+// Refuses what the kernel refuses: a duty cycle above the period, a period of nothing, anything
+// else before there is a period, another polarity while enabled, a channel that it does not have
+// or that is taken.
 // Thread contract: any thread.
 class SimPwm final : public PwmFiles {
  public:

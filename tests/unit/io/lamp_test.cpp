@@ -1,9 +1,11 @@
 // Lamps on lines and on PWM outputs: one contract for all of them, and what each has beside it.
 #include "drivers/io/lamp.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 
@@ -133,22 +135,64 @@ class PwmLampTest : public ::testing::Test {
   std::shared_ptr<SimPwm> chip = std::make_shared<SimPwm>("1f00098000.pwm", 2);
 };
 
+// A chip whose outputs are looked at after every write.
+class WatchedPwm final : public PwmFiles {
+ public:
+  WatchedPwm(std::shared_ptr<SimPwm> chip, bool active_low)
+      : chip_(std::move(chip)), active_low_(active_low) {}
+  std::vector<PwmChip> Chips() override { return chip_->Chips(); }
+  tl::expected<std::string, int> Read(const std::string& attribute) override {
+    return chip_->Read(attribute);
+  }
+  int Write(const std::string& attribute, const std::string& value) override {
+    const int error = chip_->Write(attribute, value);
+    const double high = chip_->Brightness(1);
+    brightest = std::max(brightest, active_low_ ? 1 - high : high);
+    return error;
+  }
+  double brightest = 0;
+
+ private:
+  std::shared_ptr<SimPwm> chip_;
+  const bool active_low_;
+};
+
+// As a program left it that had this period, with the output high for `duty`.
+std::shared_ptr<SimPwm> LeftChip(const char* polarity, const char* period, const char* duty) {
+  const auto chip = std::make_shared<SimPwm>("1f00098000.pwm", 2);
+  EXPECT_EQ(chip->Write("pwmchip0/export", "1"), 0);
+  EXPECT_EQ(chip->Write("pwmchip0/pwm1/period", period), 0);
+  EXPECT_EQ(chip->Write("pwmchip0/pwm1/polarity", polarity), 0);
+  EXPECT_EQ(chip->Write("pwmchip0/pwm1/duty_cycle", duty), 0);
+  EXPECT_EQ(chip->Write("pwmchip0/pwm1/enable", "1"), 0);
+  return chip;
+}
+
 TEST_F(PwmLampTest, AChannelLeftInAnyStateIsTakenOver) {
-  for (const char* polarity : {"normal", "inversed"}) {
-    for (const char* period : {"50000", "100000", "900000"}) {
-      SCOPED_TRACE(std::string(polarity) + " " + period);
-      chip = std::make_shared<SimPwm>("1f00098000.pwm", 2);
-      ASSERT_EQ(chip->Write("pwmchip0/export", "1"), 0);
-      ASSERT_EQ(chip->Write("pwmchip0/pwm1/polarity", polarity), 0);
-      ASSERT_EQ(chip->Write("pwmchip0/pwm1/period", period), 0);
-      ASSERT_EQ(chip->Write("pwmchip0/pwm1/duty_cycle", period), 0);
-      ASSERT_EQ(chip->Write("pwmchip0/pwm1/enable", "1"), 0);
-      const auto lamp = Open();
-      ASSERT_TRUE(lamp) << ToString(lamp.error());
-      EXPECT_EQ(chip->Brightness(1), 0);
-      ASSERT_TRUE((*lamp)->SetLevel(0.5));
-      EXPECT_EQ(chip->Brightness(1), 0.5);
+  for (const bool active_low : {false, true}) {
+    for (const char* polarity : {"normal", "inversed"}) {
+      for (const char* period : {"50000", "100000", "900000"}) {
+        SCOPED_TRACE(fmt::format("{} {} {}", active_low, polarity, period));
+        chip = LeftChip(polarity, period, period);
+        const auto lamp = Open(OnPwm(active_low));
+        ASSERT_TRUE(lamp) << ToString(lamp.error());
+        EXPECT_EQ(chip->Brightness(1), active_low ? 1 : 0);
+        ASSERT_TRUE((*lamp)->SetLevel(0.25));
+        EXPECT_EQ(chip->Brightness(1), active_low ? 0.75 : 0.25);
+      }
     }
+  }
+}
+
+TEST_F(PwmLampTest, ALampLeftDarkStaysSoWhileItIsTakenOver) {
+  for (const bool active_low : {false, true}) {
+    chip = LeftChip("normal", "100000", active_low ? "100000" : "0");
+    const auto watched = std::make_shared<WatchedPwm>(chip, active_low);
+    const auto lamp = OpenPwmLamp(OnPwm(active_low), watched, std::make_shared<SystemClock>());
+    ASSERT_TRUE(lamp) << ToString(lamp.error());
+    EXPECT_EQ(watched->brightest, 0);
+    ASSERT_TRUE((*lamp)->SetLevel(1));
+    EXPECT_EQ(watched->brightest, 1);
   }
 }
 
