@@ -169,6 +169,10 @@ Status ValidateLight(const LightConfig& light) {
     return BadInput("a lamp on a line is on or off", "light.level",
                     "leave it out, or put the lamp on a PWM output");
   }
+  if (light.driver == LightDriver::gpio && light.active_low) {
+    return BadInput("the sense of a lamp on a line is not set by active_low", "light.active_low",
+                    "leave it out, and write light.line = \"!NAME\"");
+  }
   if (light.driver == LightDriver::pwm && light.chip.empty()) {
     return BadInput("the lamp has no PWM chip", "light.chip",
                     "name its device ('ls -l /sys/class/pwm/*/device')");

@@ -163,6 +163,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"[motion]\nemergency_stop = '!'", "is no line", "s.toml:2"},
         BadCase{"[light]\ndriver = 'gpio'", "no line", "s.toml:1"},
         BadCase{"[light]\ndriver = 'gpio'\nline = 'L'\nlevel = 0.5", "on or off", "s.toml:4"},
+        BadCase{"[light]\ndriver = 'gpio'\nline = 'L'\nactive_low = true", "active_low",
+                "s.toml:4"},
         BadCase{"[light]\ndriver = 'pwm'", "no PWM chip", "s.toml:1"},
         BadCase{"[light]\nlevel = 0", "out of range", "s.toml:2"},
         BadCase{"[motion]\npriority = 100", "out of range", "s.toml:2"},
