@@ -1,4 +1,4 @@
-// A lamp as its driver sees it: a brightness.
+// A lamp as its driver sees it: a brightness. Captures see a Light (light.h).
 #pragma once
 
 #include "drivers/base/result.h"

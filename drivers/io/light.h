@@ -1,4 +1,5 @@
-// The station's lamp.
+// The station's lamp as a capture sees it: on or off. Which Lamp (lamp.h) gives it, how bright "on"
+// is and how long it settles are the station file's.
 #pragma once
 
 #include "drivers/base/result.h"
