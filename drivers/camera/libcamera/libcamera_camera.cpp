@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/base/durations.h"
 #include "drivers/camera/libcamera/libcamera_format.h"
 #include "drivers/camera/v4l2/convert.h"
 
@@ -19,8 +20,6 @@ constexpr std::int64_t kLookAgainNs = 500'000'000;
 constexpr double kTolerance = 0.01;  // the gate's tolerance of settings
 constexpr char kExposure[] = "ExposureTime";
 constexpr char kGain[] = "AnalogueGain";
-
-std::int64_t NsOfMs(double ms) { return std::llround(ms * 1e6); }
 
 Result<LibcameraRole> RoleOf(const std::string& word) {
   if (word == "still") return LibcameraRole::still;
@@ -263,12 +262,7 @@ Result<std::optional<Frame>> LibcameraCamera::Judge(const LibcameraCompletion& d
   }
   std::optional<std::string> fault = FindDamage(done);
   if (!fault) {
-    auto file = FileOf(stream_.format, done.bytes);
-    if (!file && file.error().kind != ErrorKind::device) return tl::unexpected(file.error());
-    if (file)
-      frame.files.push_back(std::move(*file));
-    else
-      fault = file.error().what;
+    SCAN_TRY(fault, AddFileOf(stream_.format, done.bytes, frame));
   }
   if (fault) {
     ++counters_.damaged;

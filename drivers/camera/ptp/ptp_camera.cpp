@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/base/durations.h"
 #include "drivers/camera/ptp/ptp_device.h"
 #include "drivers/camera/ptp/ptp_picture.h"
 
@@ -16,8 +17,6 @@ constexpr int kWaitMs = 100;      // a cancel is seen so soon
 constexpr int kSurplusMs = 200;   // without a further file an exposure is complete
 constexpr int kReopenMs = 500;
 constexpr double kQuietMs = 2000;  // without a file, after a shot that was given up
-
-std::int64_t NsOfMs(double ms) { return std::llround(ms * 1e6); }
 
 // Marked times are rounded (1/125 is 1/128 s): what comes before this share is of another exposure.
 constexpr double kLeastExposure = 0.7;

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <charconv>
 
+#include "drivers/base/durations.h"
 #include "drivers/camera/ptp/photo_choices.h"
 #include "drivers/camera/ptp/ptp_device.h"
 
@@ -195,8 +196,7 @@ Status PtpSettings::HoldOne(PhotoCamera& camera, Clock& clock, const Pump& pump,
                             const Held& held) const {
   SCAN_TRY(PhotoSetting now, Get(camera, held.name));
   if (SameValue(now.value, held.value)) return {};
-  const auto deadline_ns =
-      clock.Now().mono_ns + static_cast<std::int64_t>(config_.settings_ms * 1e6);
+  const auto deadline_ns = clock.Now().mono_ns + NsOfMs(config_.settings_ms);
   bool sent = false;
   std::string refusal;
   do {

@@ -230,4 +230,13 @@ Result<EncodedFile> FileOf(const StreamFormat& format, std::span<const std::byte
   return EncodePicture(picture, "png", 95);
 }
 
+Result<std::optional<std::string>> AddFileOf(const StreamFormat& format,
+                                             std::span<const std::byte> bytes, Frame& frame) {
+  Result<EncodedFile> file = FileOf(format, bytes);
+  if (!file && file.error().kind != ErrorKind::device) return tl::unexpected(file.error());
+  if (!file) return std::move(file.error().what);
+  frame.files.push_back(std::move(*file));
+  return std::nullopt;
+}
+
 }  // namespace scan

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <span>
+#include <string>
 
 #include "drivers/base/result.h"
 #include "drivers/camera/camera.h"
@@ -29,5 +31,10 @@ Result<cv::Mat> PictureOf(const StreamFormat& format, std::span<const std::byte>
 // The frame as a file of a session: MJPEG as the camera made it (checked), all else as PNG without
 // loss. Errors: as above. Thread contract: pure.
 Result<EncodedFile> FileOf(const StreamFormat& format, std::span<const std::byte> bytes);
+
+// Adds that file to `frame`; gives what is wrong with the bytes, if anything, for the caller to
+// count. Errors: what is no fault of the bytes. Thread contract: pure.
+Result<std::optional<std::string>> AddFileOf(const StreamFormat& format,
+                                             std::span<const std::byte> bytes, Frame& frame);
 
 }  // namespace scan

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "drivers/base/durations.h"
 #include "drivers/base/log.h"
 #include "drivers/camera/v4l2/convert.h"
 
@@ -20,8 +21,6 @@ constexpr std::int64_t kUnknownIntervalNs = 100'000'000;
 constexpr std::int64_t kLookAgainNs = 100'000'000;  // for a camera that is gone
 constexpr double kExposureUnitUs = 100;             // of V4L2_CID_EXPOSURE_ABSOLUTE
 constexpr double kMaxRounding = 0.01;               // the gate's tolerance of settings
-
-std::int64_t NsOfMs(double ms) { return std::llround(ms * 1e6); }
 
 // A setting in units of its control. Errors: bad_input out of range or between two steps.
 Result<std::int64_t> StepsOf(double value, double unit, const V4l2Control* control,
@@ -325,12 +324,7 @@ Result<std::optional<Frame>> V4l2Camera::Judge(const MappedFrame& mapped, std::i
   }
   std::optional<std::string> fault = FindDamage(mapped);
   if (!fault) {
-    auto file = FileOf(stream_->format(), mapped.bytes());
-    if (!file && file.error().kind != ErrorKind::device) return tl::unexpected(file.error());
-    if (file)
-      frame.files.push_back(std::move(*file));
-    else
-      fault = file.error().what;
+    SCAN_TRY(fault, AddFileOf(stream_->format(), mapped.bytes(), frame));
   }
   if (fault) {
     ++counters_.damaged;
