@@ -1,50 +1,34 @@
 #include "firmware-host/camera_worker/libcamera_options.h"
 
-#include <nlohmann/json.hpp>
+#include "firmware-host/camera_worker/options_text.h"
 
 namespace scan {
+namespace {
 
-using Json = nlohmann::json;
+constexpr auto kLibcameraFields = [](auto& options, auto visit) {
+  visit("id", options.id);
+  visit("w", options.w);
+  visit("h", options.h);
+  auto& config = options.config;
+  visit("camera", config.camera);
+  visit("role", config.role);
+  visit("pixel_format", config.pixel_format);
+  visit("lock_automatics", config.lock_automatics);
+  visit("controls", config.controls);
+  visit("latency_frames", config.latency_frames);
+  visit("settings_frames", config.settings_frames);
+  visit("timeout_ms", config.timeout_ms);
+  visit("reconnect_ms", config.reconnect_ms);
+};
+
+}  // namespace
 
 std::string ToWorkerOptions(const LibcameraOptions& options) {
-  const LibcameraConfig& config = options.config;
-  return Json{{"id", options.id},
-              {"w", options.w},
-              {"h", options.h},
-              {"camera", config.camera},
-              {"role", config.role},
-              {"pixel_format", config.pixel_format},
-              {"lock_automatics", config.lock_automatics},
-              {"controls", config.controls},
-              {"latency_frames", config.latency_frames},
-              {"settings_frames", config.settings_frames},
-              {"timeout_ms", config.timeout_ms},
-              {"reconnect_ms", config.reconnect_ms}}
-      .dump();
+  return OptionsText(options, kLibcameraFields);
 }
 
 Result<LibcameraOptions> LibcameraOptionsFrom(const std::string& text) {
-  try {
-    const Json json = Json::parse(text);
-    LibcameraOptions options;
-    LibcameraConfig& config = options.config;
-    json.at("id").get_to(options.id);
-    json.at("w").get_to(options.w);
-    json.at("h").get_to(options.h);
-    json.at("camera").get_to(config.camera);
-    json.at("role").get_to(config.role);
-    json.at("pixel_format").get_to(config.pixel_format);
-    json.at("lock_automatics").get_to(config.lock_automatics);
-    json.at("controls").get_to(config.controls);
-    json.at("latency_frames").get_to(config.latency_frames);
-    json.at("settings_frames").get_to(config.settings_frames);
-    json.at("timeout_ms").get_to(config.timeout_ms);
-    json.at("reconnect_ms").get_to(config.reconnect_ms);
-    return options;
-  } catch (const Json::exception& e) {
-    return BadInput(std::string("malformed options (") + e.what() + ")", "camera worker",
-                    "use programs of the same version");
-  }
+  return OptionsFromText<LibcameraOptions>(text, kLibcameraFields);
 }
 
 }  // namespace scan

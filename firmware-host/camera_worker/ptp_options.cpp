@@ -1,15 +1,11 @@
 #include "firmware-host/camera_worker/ptp_options.h"
 
-#include <nlohmann/json.hpp>
+#include "firmware-host/camera_worker/options_text.h"
 
 namespace scan {
 namespace {
 
-using Json = nlohmann::json;
-
-// Every field by name, for both directions.
-template <class Options, class Visit>
-void ForEachField(Options& options, Visit visit) {
+constexpr auto kPtpFields = [](auto& options, auto visit) {
   visit("id", options.id);
   visit("w", options.w);
   visit("h", options.h);
@@ -38,26 +34,16 @@ void ForEachField(Options& options, Visit visit) {
   visit("hot_shoe_active_low", config.hot_shoe_active_low);
   visit("curtain_ms", config.curtain_ms);
   visit("settings", config.settings);
-}
+};
 
 }  // namespace
 
 std::string ToWorkerOptions(const PtpCameraOptions& options) {
-  Json json = Json::object();
-  ForEachField(options, [&](const char* key, const auto& value) { json[key] = value; });
-  return json.dump();
+  return OptionsText(options, kPtpFields);
 }
 
 Result<PtpCameraOptions> PtpOptionsFrom(const std::string& text) {
-  try {
-    const Json json = Json::parse(text);
-    PtpCameraOptions options;
-    ForEachField(options, [&](const char* key, auto& value) { json.at(key).get_to(value); });
-    return options;
-  } catch (const Json::exception& e) {
-    return BadInput(std::string("malformed options (") + e.what() + ")", "camera worker",
-                    "use programs of the same version");
-  }
+  return OptionsFromText<PtpCameraOptions>(text, kPtpFields);
 }
 
 }  // namespace scan
