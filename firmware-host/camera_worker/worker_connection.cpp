@@ -9,8 +9,8 @@
 namespace scan {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-constexpr char kWhere[] = "camera worker";
+using SteadyClock = std::chrono::steady_clock;
+constexpr char kWorkerWhere[] = "camera worker";
 
 std::int64_t IdIn(const nlohmann::json& body, const char* key) {
   const auto id = body.find(key);
@@ -31,7 +31,8 @@ WorkerConnection::WorkerConnection(std::unique_ptr<CameraWorker> worker, const W
 Error WorkerConnection::Lose(const std::string& what) {
   lost_ = true;
   return {ErrorKind::device, fmt::format("the camera worker {}; it {}", what, worker_->Kill()),
-          kWhere, "check the camera and its cable; it is started again with the next picture"};
+          kWorkerWhere,
+          "check the camera and its cable; it is started again with the next picture"};
 }
 
 Result<WorkerMessage> WorkerConnection::Call(const char* function, nlohmann::json params,
@@ -54,19 +55,19 @@ Result<WorkerMessage> WorkerConnection::Await(std::int64_t id, const char* funct
                                               std::chrono::milliseconds limit,
                                               std::stop_token stop) {
   constexpr std::chrono::milliseconds kSlice{50};  // how soon a requested stop is noticed
-  auto deadline = Clock::now() + limit;
-  auto silent_since = Clock::now();
+  auto deadline = SteadyClock::now() + limit;
+  auto silent_since = SteadyClock::now();
   bool cancelled = false;
   while (true) {
     if (stop.stop_requested() && !cancelled) {
       cancelled = true;
-      deadline = std::min(deadline, Clock::now() + limits_.cancel);
+      deadline = std::min(deadline, SteadyClock::now() + limits_.cancel);
     }
     auto message = link_.Receive(kSlice);
     if (!message && message.error().kind == ErrorKind::bad_input)
       return tl::unexpected(Lose("answered nonsense (" + message.error().what + ")"));
     if (!message) return tl::unexpected(Lose(fmt::format("died during {}", function)));
-    const auto now = Clock::now();
+    const auto now = SteadyClock::now();
     if (*message) {
       nlohmann::json& body = (*message)->body;
       heard_ = true;
@@ -85,7 +86,7 @@ Result<WorkerMessage> WorkerConnection::Await(std::int64_t id, const char* funct
     if (now < deadline && (!heard_ || now < silent_since + limits_.silence)) continue;
     const Error fault = Lose(now < deadline ? "gives no sign of life"
                                             : fmt::format("did not end {} in time", function));
-    if (cancelled) return Cancelled(kWhere);
+    if (cancelled) return Cancelled(kWorkerWhere);
     return tl::unexpected(fault);
   }
 }

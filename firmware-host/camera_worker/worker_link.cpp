@@ -12,21 +12,23 @@ namespace scan {
 namespace {
 
 constexpr std::size_t kMaxPacket = 64 << 10;
-constexpr char kWhere[] = "camera worker";
-constexpr char kMend[] = "check that both programs are of the same version";
+constexpr char kLinkWhere[] = "camera worker";
+constexpr char kLinkMend[] = "check that both programs are of the same version";
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 // Without a value: the time is over.
-Result<bool> Wait(int fd, short events, Clock::time_point deadline) {
+Result<bool> Wait(int fd, short events, SteadyClock::time_point deadline) {
   while (true) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - SteadyClock::now()).count();
     pollfd descriptor{fd, events, 0};
     const int ready = ::poll(&descriptor, 1, static_cast<int>(std::clamp<long>(left, 0, 1 << 30)));
     if (ready > 0) return true;
     if (ready == 0) return false;
     if (errno != EINTR)
-      return Failed("cannot wait (" + std::string(std::strerror(errno)) + ")", kWhere, kMend);
+      return Failed("cannot wait (" + std::string(std::strerror(errno)) + ")", kLinkWhere,
+                    kLinkMend);
   }
 }
 
@@ -51,7 +53,7 @@ Status WorkerLink::Send(const WorkerMessage& message, std::chrono::milliseconds 
   using nlohmann::json;
   std::string text = message.body.dump(-1, ' ', false, json::error_handler_t::replace);
   if (text.size() > kMaxPacket || message.files.size() > kMaxWorkerFiles)
-    return BadInput("a message is too long", kWhere, kMend);
+    return BadInput("a message is too long", kLinkWhere, kLinkMend);
   iovec data{text.data(), text.size()};
   alignas(cmsghdr) std::array<char, CMSG_SPACE(kMaxWorkerFiles * sizeof(int))> control{};
   msghdr header{};
@@ -70,19 +72,20 @@ Status WorkerLink::Send(const WorkerMessage& message, std::chrono::milliseconds 
       std::memcpy(CMSG_DATA(part) + i * sizeof(int), &fd, sizeof fd);
     }
   }
-  const auto deadline = Clock::now() + patience;
+  const auto deadline = SteadyClock::now() + patience;
   while (true) {
     if (::sendmsg(socket_.get(), &header, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) return {};
     if (errno == EINTR) continue;
     if (errno != EAGAIN)
-      return Failed("cannot send (" + std::string(std::strerror(errno)) + ")", kWhere, kMend);
+      return Failed("cannot send (" + std::string(std::strerror(errno)) + ")", kLinkWhere,
+                    kLinkMend);
     SCAN_TRY(const bool writable, Wait(socket_.get(), POLLOUT, deadline));
-    if (!writable) return Failed("the peer does not read", kWhere, kMend);
+    if (!writable) return Failed("the peer does not read", kLinkWhere, kLinkMend);
   }
 }
 
 Result<std::optional<WorkerMessage>> WorkerLink::Receive(std::chrono::milliseconds timeout) {
-  SCAN_TRY(const bool readable, Wait(socket_.get(), POLLIN, Clock::now() + timeout));
+  SCAN_TRY(const bool readable, Wait(socket_.get(), POLLIN, SteadyClock::now() + timeout));
   if (!readable) return std::optional<WorkerMessage>();
   std::vector<char> buffer(kMaxPacket);
   iovec data{buffer.data(), buffer.size()};
@@ -96,14 +99,15 @@ Result<std::optional<WorkerMessage>> WorkerLink::Receive(std::chrono::millisecon
   do {
     bytes = ::recvmsg(socket_.get(), &header, MSG_CMSG_CLOEXEC);
   } while (bytes < 0 && errno == EINTR);
-  if (bytes <= 0) return Failed("the connection was closed", kWhere, kMend);
+  if (bytes <= 0) return Failed("the connection was closed", kLinkWhere, kLinkMend);
   std::optional<WorkerMessage> message(std::in_place);
   message->files = TakeFiles(header);
   if (header.msg_flags & (MSG_TRUNC | MSG_CTRUNC) || message->files.size() > kMaxWorkerFiles)
-    return BadInput("a packet is too long or carries too many descriptors", kWhere, kMend);
+    return BadInput("a packet is too long or carries too many descriptors", kLinkWhere, kLinkMend);
   message->body = nlohmann::json::parse(buffer.data(), buffer.data() + bytes, nullptr,
                                         /*allow_exceptions=*/false);
-  if (!message->body.is_object()) return BadInput("a packet is no JSON object", kWhere, kMend);
+  if (!message->body.is_object())
+    return BadInput("a packet is no JSON object", kLinkWhere, kLinkMend);
   return message;
 }
 
@@ -112,8 +116,8 @@ void WorkerLink::Close() { ::shutdown(socket_.get(), SHUT_RDWR); }
 Result<std::pair<UniqueFd, UniqueFd>> WorkerSocketPair() {
   int fds[2];
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds) != 0)
-    return Failed("cannot make a socket pair (" + std::string(std::strerror(errno)) + ")", kWhere,
-                  "close other programs");
+    return Failed("cannot make a socket pair (" + std::string(std::strerror(errno)) + ")",
+                  kLinkWhere, "close other programs");
   return std::pair(UniqueFd(fds[0]), UniqueFd(fds[1]));
 }
 
