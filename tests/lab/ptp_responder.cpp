@@ -20,6 +20,15 @@
 #include "drivers/base/unique_fd.h"
 
 namespace scan {
+
+// One property with the values that it may take; `size` bytes each.
+struct PtpProperty {
+  std::uint16_t type;  // 2 UINT8, 4 UINT16, 6 UINT32
+  std::size_t size;
+  std::vector<std::uint64_t> choices;  // empty: read only, 0 to 100
+  std::uint64_t value;
+};
+
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -86,18 +95,10 @@ bool WriteAll(int fd, const Bytes& bytes) {
   return write(fd, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
 }
 
-// One property with the values that it may take; `size` bytes each.
-struct Property {
-  std::uint16_t type;  // 2 UINT8, 4 UINT16, 6 UINT32
-  std::size_t size;
-  std::vector<std::uint64_t> choices;  // empty: read only, 0 to 100
-  std::uint64_t value;
-};
-
 constexpr std::uint16_t kBattery = 0x5001, kExposureTime = 0x500d, kProgram = 0x500e,
                         kSpeed = 0x500f;
 
-std::map<std::uint16_t, Property> Properties() {
+std::map<std::uint16_t, PtpProperty> Properties() {
   return {{kBattery, {2, 1, {}, 80}},
           {kExposureTime, {6, 4, {10, 40, 80, 100, 166, 10'000}, 80}},  // tenths of milliseconds
           {kProgram, {4, 2, {1, 2}, 1}},                                // M, P
@@ -293,7 +294,7 @@ class PtpResponder::Impl {
     if (data.type != 2) return kBadValue;  // unplugged before it came
     const auto found = properties_.find(code);
     if (found == properties_.end()) return kBadProperty;
-    Property& property = found->second;
+    PtpProperty& property = found->second;
     const std::uint64_t value = Take(data.body, 0, property.size);
     if (std::find(property.choices.begin(), property.choices.end(), value) ==
         property.choices.end())
@@ -364,12 +365,12 @@ class PtpResponder::Impl {
     return out;
   }
 
-  static void PutValue(Bytes& out, const Property& property, std::uint64_t value) {
+  static void PutValue(Bytes& out, const PtpProperty& property, std::uint64_t value) {
     for (std::size_t k = 0; k < property.size; ++k)
       out.push_back(static_cast<std::uint8_t>(value >> (8 * k)));
   }
 
-  static Bytes Describe(std::uint16_t code, const Property& property) {
+  static Bytes Describe(std::uint16_t code, const PtpProperty& property) {
     Bytes out;
     Put(out, code);
     Put(out, property.type);
@@ -390,7 +391,7 @@ class PtpResponder::Impl {
   PtpPainter painter_;
   UniqueFd ep0_, in_, out_, events_;
   bool described_ = false;
-  std::map<std::uint16_t, Property> properties_ = Properties();
+  std::map<std::uint16_t, PtpProperty> properties_ = Properties();
   std::map<std::uint32_t, Bytes> objects_;
   std::uint32_t next_ = 1;
   std::mutex mutex_;  // of queue_

@@ -21,6 +21,23 @@
 #include "drivers/base/unique_fd.h"
 
 namespace scan {
+
+// USB Video Class 1.1, table 4-75: the streaming interface's probe and commit controls.
+struct [[gnu::packed]] UvcStreamingControl {
+  std::uint16_t bmHint;
+  std::uint8_t bFormatIndex, bFrameIndex;
+  std::uint32_t dwFrameInterval;
+  std::uint16_t wKeyFrameRate, wPFrameRate, wCompQuality, wCompWindowSize, wDelay;
+  std::uint32_t dwMaxVideoFrameSize, dwMaxPayloadTransferSize, dwClockFrequency;
+  std::uint8_t bmFramingInfo, bPreferedVersion, bMinVersion, bMaxVersion;
+};
+
+// One control of the camera terminal (entity 1) or the processing unit (entity 2).
+struct UvcUnitControl {
+  std::uint16_t size = 2;
+  std::int32_t min = 0, max = 0, step = 1, standard = 0, now = 0;
+};
+
 namespace {
 
 constexpr std::int64_t kTickMs = 5;
@@ -33,21 +50,6 @@ std::int64_t NowNs() {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-// USB Video Class 1.1, table 4-75: the streaming interface's probe and commit controls.
-struct [[gnu::packed]] StreamingControl {
-  std::uint16_t bmHint;
-  std::uint8_t bFormatIndex, bFrameIndex;
-  std::uint32_t dwFrameInterval;
-  std::uint16_t wKeyFrameRate, wPFrameRate, wCompQuality, wCompWindowSize, wDelay;
-  std::uint32_t dwMaxVideoFrameSize, dwMaxPayloadTransferSize, dwClockFrequency;
-  std::uint8_t bmFramingInfo, bPreferedVersion, bMinVersion, bMaxVersion;
-};
-
-// One control of the camera terminal (entity 1) or the processing unit (entity 2).
-struct UnitControl {
-  std::uint16_t size = 2;
-  std::int32_t min = 0, max = 0, step = 1, standard = 0, now = 0;
-};
 using UnitKey = std::pair<int, int>;  // entity, selector
 constexpr UnitKey kExposureMode{1, 2}, kExposureTime{1, 4};
 
@@ -103,8 +105,8 @@ class UvcGadget::Feeder {
     std::size_t size = 0;
   };
 
-  static StreamingControl Standard(int format, int frame, std::uint32_t interval) {
-    StreamingControl c{};
+  static UvcStreamingControl Standard(int format, int frame, std::uint32_t interval) {
+    UvcStreamingControl c{};
     c.bmHint = 1;
     c.bFormatIndex = static_cast<std::uint8_t>(std::clamp(format, 1, 2));
     c.bFrameIndex = static_cast<std::uint8_t>(std::clamp(frame, 1, 3));
@@ -156,7 +158,7 @@ class UvcGadget::Feeder {
   }
 
   void AnswerStreaming(const usb_ctrlrequest& request, uvc_request_data& answer) {
-    StreamingControl control = pending_.selector == UVC_VS_COMMIT_CONTROL ? commit_ : probe_;
+    UvcStreamingControl control = pending_.selector == UVC_VS_COMMIT_CONTROL ? commit_ : probe_;
     if (request.bRequest == UVC_GET_MIN || request.bRequest == UVC_GET_DEF)
       control = Standard(kYuyv, 1, 0);
     if (request.bRequest == UVC_GET_MAX) control = Standard(kMjpeg, 3, 0);
@@ -170,7 +172,7 @@ class UvcGadget::Feeder {
       std::memcpy(answer.data, &control, static_cast<std::size_t>(answer.length));
   }
 
-  void AnswerUnit(const usb_ctrlrequest& request, const UnitControl& unit,
+  void AnswerUnit(const usb_ctrlrequest& request, const UvcUnitControl& unit,
                   uvc_request_data& answer) {
     answer.length = std::min<int>(request.wLength, unit.size);
     const auto put = [&](std::int32_t value) { std::memcpy(answer.data, &value, 4); };
@@ -207,9 +209,9 @@ class UvcGadget::Feeder {
 
   void TakeData(const uvc_request_data& data) {
     if (pending_.interface == 1 && pending_.entity == 0) {
-      StreamingControl asked{};
+      UvcStreamingControl asked{};
       std::memcpy(&asked, data.data, std::min<std::size_t>(sizeof(asked), sizeof(data.data)));
-      StreamingControl& control = pending_.selector == UVC_VS_COMMIT_CONTROL ? commit_ : probe_;
+      UvcStreamingControl& control = pending_.selector == UVC_VS_COMMIT_CONTROL ? commit_ : probe_;
       control = Standard(asked.bFormatIndex, asked.bFrameIndex, asked.dwFrameInterval);
       return;
     }
@@ -303,8 +305,8 @@ class UvcGadget::Feeder {
   UniqueFd own_;
   int fd_;
   GadgetPainter painter_;
-  StreamingControl probe_{}, commit_{};
-  std::map<UnitKey, UnitControl> units_;
+  UvcStreamingControl probe_{}, commit_{};
+  std::map<UnitKey, UvcUnitControl> units_;
   Pending pending_;
   std::vector<Buffer> buffers_;
   std::vector<std::uint32_t> idle_;
