@@ -9,6 +9,8 @@ namespace scan {
 
 enum class LightDriver { none, gpio, pwm };
 
+constexpr double kMaxSettleMs = 60'000;
+
 struct LightConfig {
   LightDriver driver = LightDriver::none;
   std::string chip;         // gpio: label, empty: the one that has the line; pwm: its device's name

@@ -60,7 +60,7 @@ void ReadLight(TomlReader& in, LightConfig& light) {
   in.Flag("active_low", light.active_low);
   in.Number("period_us", light.period_us, 1, 1e6);
   in.Number("level", light.level, 0.001, 1);
-  in.Number("settle_ms", light.settle_ms, 0, 60'000);
+  in.Number("settle_ms", light.settle_ms, 0, kMaxSettleMs);
 }
 
 void ReadTic(TomlReader& in, TicAxisWiring& wiring) {

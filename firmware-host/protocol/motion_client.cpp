@@ -30,7 +30,7 @@ class LightClient final : public Light {
   Status Set(bool on) override {
     SCAN_TRY(const Json answer,
              link_->client().Call("set_light", Json{{"on", on}}, kHeartbeatLimit));
-    const double settle_ms = answer.is_object() ? answer.value("settle_ms", 0.0) : 0.0;
+    SCAN_TRY(const double settle_ms, SettleMsFromJson(answer));
     clock_->SleepFor(std::llround(settle_ms * 1e6));
     return {};
   }

@@ -1,6 +1,10 @@
 #include "firmware-host/protocol/motion_messages.h"
 
+#include <fmt/format.h>
+
 #include <array>
+
+#include "drivers/io/light_config.h"
 
 namespace scan {
 namespace {
@@ -119,6 +123,14 @@ Result<MotionStatus> MotionStatusFromJson(const Json& json) {
                         j.at("fault").get<std::string>(),     AlarmFrom(j.at("alarm")),
                         j.at("interlocks").get<std::string>()};
   });
+}
+Result<double> SettleMsFromJson(const Json& json) {
+  SCAN_TRY(const double ms, Guarded<double>("set_light", json, [](const Json& j) {
+             return j.at("settle_ms").get<double>();
+           }));
+  if (ms >= 0 && ms <= kMaxSettleMs) return ms;
+  return BadInput(fmt::format("a lamp does not settle for {} ms", ms), "set_light",
+                  "use programs of the same version");
 }
 
 }  // namespace scan

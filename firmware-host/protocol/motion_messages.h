@@ -19,6 +19,8 @@ Result<StageTarget> StageTargetFromJson(const Json& json);
 Result<HomeReport> HomeReportFromJson(const Json& json);
 Result<MoveReport> MoveReportFromJson(const Json& json);
 Result<MotionStatus> MotionStatusFromJson(const Json& json);
+// How long the lamp settles, ms, of the answer to set_light.
+Result<double> SettleMsFromJson(const Json& json);
 
 const char* AxisStateName(AxisState state);
 

@@ -217,6 +217,11 @@ TEST(MotionProtocol, AStationWithoutALampSaysSo) {
 TEST(MotionProtocol, MalformedMessagesNameTheField) {
   EXPECT_EQ(StageTargetFromJson(Json{{"lift_mm", 3}}).error().kind, ErrorKind::bad_input);
   EXPECT_FALSE(MotionStatusFromJson(Json(3)));
+  for (const Json& answer : {Json(3), Json::object(), Json{{"settle_ms", "soon"}},
+                             Json{{"settle_ms", -1}}, Json{{"settle_ms", 1e300}}}) {
+    EXPECT_EQ(SettleMsFromJson(answer).error().kind, ErrorKind::bad_input) << answer;
+  }
+  EXPECT_EQ(SettleMsFromJson(Json{{"settle_ms", 20}}), 20);
   Json status = ToJson(MotionStatus{});
   status["lift"] = "flying";
   EXPECT_FALSE(MotionStatusFromJson(status));
