@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "drivers/base/clock.h"
 #include "drivers/io/gpio/gpio_pin.h"
@@ -132,8 +133,9 @@ struct LightOptions {
   double seconds = 0;
 };
 
-Result<double> ParseLevel(const std::string& text) {
-  if (text == "on") return 1.0;
+// Nothing: the level of the station file.
+Result<std::optional<double>> ParseLevel(const std::string& text) {
+  if (text == "on") return std::nullopt;
   if (text == "off") return 0.0;
   double level = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
@@ -145,10 +147,12 @@ Result<double> ParseLevel(const std::string& text) {
 
 // Lit as long as the command runs: a lamp that nobody answers for goes dark.
 Result<CommandOutput> SetLight(const LightOptions& options, const CliContext& context) {
-  SCAN_TRY(const double level, ParseLevel(options.level));
+  SCAN_TRY(const std::optional<double> level, ParseLevel(options.level));
   SCAN_TRY(const auto motion, Connect({options.socket, {}}));
-  SCAN_CHECK(motion->SetLightLevel(level));
-  if (level > 0) {
+  SCAN_CHECK(level ? motion->SetLightLevel(*level)
+                   : motion->MakeLight(std::make_shared<SystemClock>())->Set(true));
+  const bool lit = !level || *level > 0;
+  if (lit) {
     fmt::print(stderr, "lit until {}\n",
                options.seconds > 0 ? fmt::format("{} s are over", options.seconds) : "interrupted");
     SystemClock clock;
@@ -157,8 +161,8 @@ Result<CommandOutput> SetLight(const LightOptions& options, const CliContext& co
     clock.SleepFor(lit_ns, context.stop);
     SCAN_CHECK(motion->SetLightLevel(0));
   }
-  return CommandOutput{{{"level", level}},
-                       fmt::format("light {}\n", level > 0 ? "was lit" : "off")};
+  return CommandOutput{{{"light", options.level}},
+                       fmt::format("light {}\n", lit ? "was lit" : "off")};
 }
 
 void AddLight(CommandSet& commands, CLI::App& device) {
@@ -166,8 +170,10 @@ void AddLight(CommandSet& commands, CLI::App& device) {
   CLI::App& light = commands.AddTo(
       device, "light", "The station's lamp, through scanstation-motiond; lit until interrupted",
       [options](const CliContext& context) { return SetLight(*options, context); });
-  light.add_option("level", options->level, "on, off, or 0 to 1")->required();
-  light.add_option("--seconds", options->seconds, "end after so long")->check(Positive());
+  light.add_option("level", options->level, "on (as the station file says), off, or 0 to 1")
+      ->required();
+  light.add_option("--seconds", options->seconds, "end after so long")
+      ->check(CLI::Range(0.001, 1e6));
   light.add_option("--socket", options->socket, "scanstation-motiond's socket")
       ->capture_default_str();
 }
