@@ -7,7 +7,7 @@
 #include <set>
 
 #include "drivers/motion/tic/tic_protocol.h"
-#include "drivers/motion/tmc2209/tmc2209_protocol.h"
+#include "drivers/motion/tmc2209/tmc2209_motion.h"
 
 namespace scan {
 namespace {
@@ -116,26 +116,6 @@ Status ValidateTic(const AxisConfig& axis, const TicAxisWiring& wiring) {
   return {};
 }
 
-Status ValidateTmc2209Of(const AxisConfig& axis, const Tmc2209Config& config) {
-  if (config.port.empty()) return {};
-  const Status valid = ValidateTmc2209(config);
-  if (valid) return {};
-  return BadInput(valid.error().what,
-                  fmt::format("axis.{}.tmc2209.{}", axis.name, valid.error().where),
-                  valid.error().mend);
-}
-
-Status ValidateTmc2209s(const StationConfig& config) {
-  const Tmc2209Config &turntable = config.turntable_tmc2209, &lift = config.lift_tmc2209;
-  SCAN_CHECK(ValidateTmc2209Of(config.turntable, turntable));
-  SCAN_CHECK(ValidateTmc2209Of(config.lift, lift));
-  if (!turntable.port.empty() && turntable.port == lift.port && turntable.address == lift.address) {
-    return BadInput("both axes name the same driver", "axis.lift.tmc2209.address",
-                    "name an address each");
-  }
-  return {};
-}
-
 Status ValidateDriver(const StationConfig& config) {
   if (config.motion_driver == MotionDriver::sim) return {};
   if (config.motion_driver == MotionDriver::gpio) {
@@ -145,7 +125,7 @@ Status ValidateDriver(const StationConfig& config) {
     }
     SCAN_CHECK(ValidateWiring(config.turntable, config.gpio.turntable));
     SCAN_CHECK(ValidateWiring(config.lift, config.gpio.lift));
-    SCAN_CHECK(ValidateTmc2209s(config));
+    SCAN_CHECK(ValidateTmc2209s(config.turntable_tmc2209, config.lift_tmc2209));
   } else {
     SCAN_CHECK(ValidateTic(config.turntable, config.tic.turntable));
     SCAN_CHECK(ValidateTic(config.lift, config.tic.lift));

@@ -85,6 +85,9 @@ class Tmc2209Motion final : public Motion {
 
   Result<HomeReport> Home(std::stop_token stop) override {
     if (stop.stop_requested()) return Cancelled("homing");
+    // A set-up forgets what the drivers had to tell: a homing that an interlock then refuses must
+    // not leave a position behind that nobody has compared.
+    SCAN_CHECK(inner_->Abort());
     for (Driven& driven : drivers_) {
       SCAN_CHECK(Noted(SetUp(driven)));
       SCAN_CHECK(Noted(ShowStalls(*driven.bus, driven.config, true)));
@@ -182,14 +185,28 @@ bool HasTmc2209(const Tmc2209Config& turntable, const Tmc2209Config& lift) {
   return !turntable.port.empty() || !lift.port.empty();
 }
 
+Status ValidateTmc2209s(const Tmc2209Config& turntable, const Tmc2209Config& lift) {
+  for (const auto& [axis, config] :
+       {std::pair("turntable", &turntable), std::pair("lift", &lift)}) {
+    if (config->port.empty()) continue;
+    if (const Status valid = ValidateTmc2209(*config); !valid) {
+      return BadInput(valid.error().what,
+                      fmt::format("axis.{}.tmc2209.{}", axis, valid.error().where),
+                      valid.error().mend);
+    }
+  }
+  if (!lift.port.empty() && turntable.port == lift.port && turntable.address == lift.address) {
+    return BadInput("both axes name the same driver", "axis.lift.tmc2209.address",
+                    "name an address each");
+  }
+  return {};
+}
+
 Result<std::unique_ptr<Motion>> MakeTmc2209Motion(const Tmc2209Config& turntable,
                                                   const Tmc2209Config& lift,
                                                   const SerialOpener& open,
                                                   const StepMotionMaker& make) {
-  if (turntable.port == lift.port && turntable.address == lift.address) {
-    return BadInput("both axes name the same driver", "axis.lift.tmc2209.address",
-                    "name an address each");
-  }
+  SCAN_CHECK(ValidateTmc2209s(turntable, lift));
   std::vector<Driven> drivers;
   for (const auto& [axis, config] :
        {std::pair("turntable", &turntable), std::pair("lift", &lift)}) {

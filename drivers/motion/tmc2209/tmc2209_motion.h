@@ -15,6 +15,9 @@ namespace scan {
 // Whether any axis has one.
 bool HasTmc2209(const Tmc2209Config& turntable, const Tmc2209Config& lift);
 
+// Errors: bad_input naming the key, of either axis, or for two axes on one address.
+Status ValidateTmc2209s(const Tmc2209Config& turntable, const Tmc2209Config& lift);
+
 // Makes the motion on its lines, with every axis' port wrapped.
 using StepMotionMaker = std::function<Result<std::unique_ptr<Motion>>(const StepPortWrap&)>;
 
@@ -25,7 +28,7 @@ using StepMotionMaker = std::function<Result<std::unique_ptr<Motion>>(const Step
 // overtemperature or undervoltage, or one that is silent: a fault, the motion is aborted, only
 // homing clears it. A hot driver or an open load is a minor alarm. The sense in which a counter
 // runs is learnt from the first motion that shows it.
-// Errors: device; bad_input as ValidateTmc2209, or for two axes on one address.
+// Errors: device; bad_input as ValidateTmc2209s.
 Result<std::unique_ptr<Motion>> MakeTmc2209Motion(const Tmc2209Config& turntable,
                                                   const Tmc2209Config& lift,
                                                   const SerialOpener& open,

@@ -171,6 +171,7 @@ class UnitMotion final : public Motion {
       : turntable_(std::move(turntable)), lift_(std::move(lift)), on_home_(std::move(on_home)) {}
   Result<HomeReport> Home(std::stop_token) override {
     on_home_();
+    if (refuses) return DeviceFault("interlock: cover open", "stage", "close it");
     Go(*turntable_, 7);
     aborted = false;
     return HomeReport{};
@@ -190,7 +191,7 @@ class UnitMotion final : public Motion {
     return {};
   }
   MotionStatus ReadStatus() override { return {}; }
-  bool aborted = false;
+  bool aborted = false, refuses = false;
 
  private:
   static void Go(StepPort& port, int steps) {
@@ -284,6 +285,18 @@ TEST_F(TmcMotion, ADriverThatStartsAnewIsAFaultUntilHomedAndThenSetUpAgain) {
   ASSERT_TRUE(motion->Home({}));
   EXPECT_EQ(line->Register(0, TmcRegister::gconf), TmcGconf(turntable_config));
   EXPECT_TRUE(motion->MoveTo({20, 0, "a0"}, {}));
+}
+
+TEST_F(TmcMotion, AHomingThatIsRefusedHidesNoDriverThatHasStartedAnew) {
+  Make();
+  ASSERT_TRUE(motion->Home({}));
+  line->Reset(0);
+  unit->refuses = true;
+  EXPECT_THAT(motion->Home({}).error().what, HasSubstr("cover open"));
+  EXPECT_FALSE(motion->MoveTo({10, 0, "a0"}, {})) << "the position is unknown";
+  unit->refuses = false;
+  ASSERT_TRUE(motion->Home({}));
+  EXPECT_TRUE(motion->MoveTo({10, 0, "a0"}, {}));
 }
 
 TEST_F(TmcMotion, FlagsAreFaultsOrAlarms) {
