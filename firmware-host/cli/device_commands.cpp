@@ -2,11 +2,10 @@
 // daemon must not be using it.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <filesystem>
 #include <memory>
+#include <tuple>
 
-#include "drivers/base/files.h"
 #include "drivers/camera/v4l2/kernel_v4l2.h"
 #include "drivers/camera/v4l2/v4l2_camera.h"
 #include "drivers/station/station_file.h"
@@ -21,12 +20,9 @@ struct CameraOptions {
   CameraSelector selector;
   std::string format, size;
   std::vector<std::string> controls;  // NAME=VALUE
-  double exposure_us = 0;
+  StillOptions still;
   std::filesystem::path config;
   std::string camera = "c0";
-  std::filesystem::path out;
-  int count = 1;
-  bool force = false;
 };
 
 std::shared_ptr<V4l2System> Kernel() { return std::make_shared<KernelV4l2>(); }
@@ -116,13 +112,6 @@ Result<CommandOutput> ListCameraControls(const CameraOptions& options) {
   return output;
 }
 
-Result<std::pair<std::string, std::string>> SplitAssignment(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0)
-    return BadInput(fmt::format("'{}' sets nothing", text), "device camera", "write NAME=VALUE");
-  return std::pair(text.substr(0, equals), text.substr(equals + 1));
-}
-
 Result<CommandOutput> SetCameraControls(const CameraOptions& options) {
   SCAN_TRY(const auto device, OpenSelected(Kernel(), options.selector));
   CommandOutput output{{{"camera", device->node().name}, {"applied", Json::object()}}, ""};
@@ -139,16 +128,6 @@ Result<CommandOutput> SetCameraControls(const CameraOptions& options) {
     output.text += fmt::format("{} = {}\n", control->name, ControlValueText(*control, made));
   }
   return output;
-}
-
-Status ReadSize(const std::string& text, V4l2CameraOptions& options) {
-  if (text.empty()) return {};
-  const char* end = text.data() + text.size();
-  const auto w = std::from_chars(text.data(), end, options.w);
-  const bool has_x = w.ec == std::errc() && w.ptr != end && *w.ptr == 'x';
-  const auto h = has_x ? std::from_chars(w.ptr + 1, end, options.h) : w;
-  if (has_x && h.ec == std::errc() && h.ptr == end && options.w > 0 && options.h > 0) return {};
-  return BadInput(fmt::format("'{}' is no size", text), "--size", "write WIDTHxHEIGHT, in pixels");
 }
 
 Result<std::unique_ptr<Camera>> OpenForStills(const CameraOptions& options) {
@@ -169,35 +148,17 @@ Result<std::unique_ptr<Camera>> OpenForStills(const CameraOptions& options) {
     SCAN_TRY(auto pair, SplitAssignment(assignment));
     camera.config.controls.insert(std::move(pair));
   }
-  SCAN_CHECK(ReadSize(options.size, camera));
+  if (!options.size.empty()) {
+    SCAN_TRY(const auto size, ReadSize(options.size));
+    std::tie(camera.w, camera.h) = size;
+  }
   SCAN_TRY(std::unique_ptr<Camera> opened, V4l2Camera::Open(camera, Kernel(), clock));
   return opened;
 }
 
-Result<CommandOutput> GrabStills(const CameraOptions& options, const CliContext& context) {
+Result<CommandOutput> GrabKernelStills(const CameraOptions& options, const CliContext& context) {
   SCAN_TRY(const auto camera, OpenForStills(options));
-  CameraSettings settings;
-  if (options.exposure_us > 0) settings.exposure_us = options.exposure_us;
-  SCAN_CHECK(camera->Configure(settings));
-  CommandOutput output{{{"camera", camera->Info().model}, {"stills", Json::array()}}, ""};
-  for (int i = 1; i <= options.count; ++i) {
-    SCAN_TRY(const Frame frame, camera->Grab(context.stop));
-    const EncodedFile& file = frame.files.front();
-    const auto path = NumberedPath(options.out, file.extension, i, options.count);
-    SCAN_CHECK(PrepareOutputFile(path, options.force));
-    SCAN_CHECK(WriteFileDurably(path, file.bytes));
-    Json still = {{"path", path.string()},
-                  {"sensor_sequence", frame.sensor_sequence},
-                  {"exposure_not_before_ns", frame.exposure.not_before_ns},
-                  {"exposure_not_after_ns", frame.exposure.not_after_ns}};
-    if (frame.applied.exposure_us) still["exposure_us"] = *frame.applied.exposure_us;
-    output.json["stills"].push_back(std::move(still));
-    output.text +=
-        fmt::format("{}: {} x {}, exposure {}\n", path.string(), camera->Info().w, camera->Info().h,
-                    frame.applied.exposure_us ? fmt::format("{:g} us", *frame.applied.exposure_us)
-                                              : "not reported");
-  }
-  return output;
+  return TakeStills(*camera, options.still, context.stop);
 }
 
 void AddSelector(CLI::App& command, const std::shared_ptr<CameraOptions>& options) {
@@ -231,10 +192,9 @@ void AddCameraDevices(CommandSet& commands, CLI::App& device) {
   auto options = std::make_shared<CameraOptions>();
   CLI::App& grab = commands.AddTo(
       camera, "grab", "Take stills with exposure, gain, white balance and focus locked",
-      [options](const CliContext& context) { return GrabStills(*options, context); });
+      [options](const CliContext& context) { return GrabKernelStills(*options, context); });
   AddSelector(grab, options);
-  grab.add_option("--out", options->out, "picture file; jpg or png is the camera's choice")
-      ->required();
+  AddStillOptions(grab, options->still);
   CLI::Option* config =
       grab.add_option("--config", options->config, "station file that says which camera and how");
   grab.add_option("--camera", options->camera, "id of the camera in that file")
@@ -242,10 +202,7 @@ void AddCameraDevices(CommandSet& commands, CLI::App& device) {
       ->needs(config);
   grab.add_option("--format", options->format, "MJPG YUYV NV12 ...; default the best of the size");
   grab.add_option("--size", options->size, "WIDTHxHEIGHT; default the largest");
-  grab.add_option("--exposure-us", options->exposure_us, "exposure time; default as it is");
   grab.add_option("--set", options->controls, "NAME=VALUE of a control, more than once if needed");
-  grab.add_option("--count", options->count, "so many stills")->check(CLI::Range(1, 10'000));
-  grab.add_flag("--force", options->force, "overwrite files");
   for (const char* said_by_the_file : {"--port", "--name", "--format", "--size", "--set"})
     config->excludes(grab.get_option(said_by_the_file));
 }

@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <tuple>
 
-#include "drivers/base/files.h"
 #include "drivers/station/station_file.h"
-#include "firmware-host/camera_worker/camera_messages.h"
+#include "firmware-host/camera_worker/camera_listing.h"
 #include "firmware-host/cli/commands.h"
+#include "firmware-host/cli/still_files.h"
 #include "firmware-host/devices/open_camera.h"
 #include "firmware-host/devices/open_ptp.h"
 
@@ -21,11 +21,9 @@ struct PtpOptions {
   PtpCameraOptions camera;
   std::vector<std::string> words;  // names, or NAME=VALUE
   std::string size;
-  double exposure_us = 0, gain = 0;
-  std::filesystem::path config, out;
+  StillOptions still;
+  std::filesystem::path config;
   std::string camera_id = "c0";
-  int count = 1;
-  bool force = false;
 };
 
 Result<CommandOutput> ListStillCameras() {
@@ -71,47 +69,17 @@ Result<std::unique_ptr<Camera>> OpenForStills(PtpOptions& options) {
                       options.config.string(), "choose another --camera or --config");
     return OpenCamera(*camera, std::make_shared<SystemClock>());
   }
-  int w = 0, h = 0, used = 0;
-  if (std::sscanf(options.size.c_str(), "%dx%d%n", &w, &h, &used) != 2 || w <= 0 || h <= 0 ||
-      static_cast<std::size_t>(used) != options.size.size())
-    return BadInput(fmt::format("'{}' is no size", options.size), "--size",
-                    "write WIDTHxHEIGHT of the camera's JPEG, in pixels, or name a --config");
-  options.camera.w = w;
-  options.camera.h = h;
+  if (options.size.empty())
+    return BadInput("the size of the camera's JPEG is not known", "--size",
+                    "write WIDTHxHEIGHT, in pixels, or name a --config");
+  SCAN_TRY(const auto size, ReadSize(options.size));
+  std::tie(options.camera.w, options.camera.h) = size;
   return OpenPtp(options.camera);
 }
 
-Result<CommandOutput> GrabStills(PtpOptions options, const CliContext& context) {
+Result<CommandOutput> GrabTetheredStills(PtpOptions options, const CliContext& context) {
   SCAN_TRY(const auto camera, OpenForStills(options));
-  CameraSettings settings;
-  if (options.exposure_us > 0) settings.exposure_us = options.exposure_us;
-  if (options.gain > 0) settings.gain = options.gain;
-  SCAN_CHECK(camera->Configure(settings));
-  CommandOutput output{{{"camera", camera->Info().model}, {"stills", Json::array()}}, ""};
-  for (int i = 1; i <= options.count; ++i) {
-    SCAN_TRY(const Frame frame, camera->Grab(context.stop));
-    Json still = {{"paths", Json::array()},
-                  {"exposure_not_before_ns", frame.exposure.not_before_ns},
-                  {"exposure_not_after_ns", frame.exposure.not_after_ns},
-                  {"hot_shoe", frame.exposure.source == ExposureSource::hot_shoe}};
-    if (frame.applied.exposure_us) still["exposure_us"] = *frame.applied.exposure_us;
-    if (frame.applied.gain) still["gain"] = *frame.applied.gain;
-    for (const EncodedFile& file : frame.files) {
-      std::filesystem::path path = options.out;
-      if (options.count > 1)
-        path.replace_filename(fmt::format("{}-{}", options.out.stem().string(), i));
-      path.replace_extension(file.extension);
-      SCAN_CHECK(PrepareOutputFile(path, options.force));
-      SCAN_CHECK(WriteFileDurably(path, file.bytes));
-      still["paths"].push_back(path.string());
-      output.text +=
-          fmt::format("{}: {} bytes, exposure {}\n", path.string(), file.bytes.size(),
-                      frame.applied.exposure_us ? fmt::format("{:g} us", *frame.applied.exposure_us)
-                                                : "not reported");
-    }
-    output.json["stills"].push_back(std::move(still));
-  }
-  return output;
+  return TakeStills(*camera, options.still, context.stop);
 }
 
 void AddSelector(CLI::App& command, PtpOptions& options) {
@@ -125,11 +93,10 @@ void AddGrab(CommandSet& commands, CLI::App& ptp) {
   options->camera.config.target = "";  // as the camera has it
   CLI::App& grab = commands.AddTo(
       ptp, "grab", "Take stills; RAW and JPEG of one exposure are two files",
-      [options](const CliContext& context) { return GrabStills(*options, context); });
+      [options](const CliContext& context) { return GrabTetheredStills(*options, context); });
   AddSelector(grab, *options);
   PtpConfig& config = options->camera.config;
-  grab.add_option("--out", options->out, "picture file; the extension is the camera's choice")
-      ->required();
+  AddStillOptions(grab, options->still);
   CLI::Option* file =
       grab.add_option("--config", options->config, "station file that says which camera and how");
   grab.add_option("--camera", options->camera_id, "id of the camera in that file")
@@ -140,15 +107,11 @@ void AddGrab(CommandSet& commands, CLI::App& ptp) {
       ->check(CLI::IsMember({"ram", "card"}));
   grab.add_option("--quality", config.quality, "entry of imagequality or imageformat");
   grab.add_option("--f-number", config.f_number, "aperture; default as it is")->check(Positive());
-  grab.add_option("--exposure-us", options->exposure_us, "exposure time; default as it is")
-      ->check(Positive());
-  grab.add_option("--gain", options->gain, "ISO speed over 100; default as it is")
+  grab.add_option("--gain", options->still.gain, "ISO speed over 100; default as it is")
       ->check(Positive());
   grab.add_flag(
       "--any-focus", [&config](std::int64_t) { config.manual_focus = false; },
       "even when the lens is on automatic focus");
-  grab.add_option("--count", options->count, "so many stills")->check(CLI::Range(1, 10'000));
-  grab.add_flag("--force", options->force, "overwrite files");
   for (const char* said_by_the_file :
        {"--port", "--serial", "--model", "--size", "--target", "--quality", "--f-number"})
     file->excludes(grab.get_option(said_by_the_file));
