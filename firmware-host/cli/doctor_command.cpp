@@ -1,4 +1,4 @@
-// scanstation doctor: what motion on this machine has, what it lacks, how to mend it.
+// scanstation doctor: what this machine has for a station's devices, what it lacks, how to mend it.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -11,6 +11,8 @@
 #include <memory>
 #include <thread>
 
+#include "drivers/camera/v4l2/kernel_v4l2.h"
+#include "drivers/camera/v4l2/v4l2_device.h"
 #include "drivers/io/gpio/gpiod_lines.h"
 #include "drivers/io/pwm/pwm_lamp.h"
 #include "drivers/motion/real_time.h"
@@ -170,6 +172,27 @@ void CheckTics(std::vector<Finding>& findings, const StationConfig& config) {
   }
 }
 
+// The kernel's cameras; and, of a station that uses them, its own. One that is streaming may be
+// opened for a look.
+void CheckKernelCameras(std::vector<Finding>& findings, const StationConfig& config) {
+  const auto system = std::make_shared<KernelV4l2>();
+  std::string names;
+  for (const VideoNode& node : ListCaptureNodes(system))
+    names += fmt::format("{}{} at {}", names.empty() ? "" : ", ", node.name, node.port);
+  findings.push_back({Verdict::good, "V4L2",
+                      names.empty() ? "no camera that this user may open" : "finds " + names, ""});
+  for (const CameraConfig& camera : config.cameras) {
+    if (camera.driver != CameraDriver::v4l2) continue;
+    const auto found = OpenSelected(system, {camera.v4l2.port, camera.v4l2.name});
+    if (found) {
+      findings.push_back({Verdict::good, "camera " + camera.id, "is " + (*found)->Where(), ""});
+    } else {
+      findings.push_back(
+          {Verdict::bad, "camera " + camera.id, found.error().what, found.error().mend});
+    }
+  }
+}
+
 // What libcamera finds; and, of a station that uses it, its cameras.
 void CheckLibcamera(std::vector<Finding>& findings, const StationConfig& config) {
   const auto uses = [](const CameraConfig& camera) {
@@ -211,11 +234,14 @@ void CheckStillCameras(std::vector<Finding>& findings, const StationConfig& conf
       findings.push_back({Verdict::bad, subject, ToString(info.error()), info.error().mend});
       continue;
     }
+    const double battery_percent = info->value("battery_percent", -1.0);
     findings.push_back({Verdict::good, subject,
-                        fmt::format("{} at port {}, battery {} %", info->value("camera", ""),
-                                    info->value("port", ""), info->value("battery_percent", -1.0)),
+                        fmt::format("{} at port {}, battery {}", info->value("camera", ""),
+                                    info->value("port", ""),
+                                    battery_percent < 0 ? std::string("not reported")
+                                                        : fmt::format("{:g} %", battery_percent)),
                         ""});
-    if (info->value("battery_percent", 100.0) < camera.ptp.min_battery_percent)
+    if (battery_percent >= 0 && battery_percent < camera.ptp.min_battery_percent)
       findings.push_back({Verdict::bad, subject, "its battery is low", "charge it"});
     for (const auto& program : info->value("competitors", std::vector<std::string>()))
       findings.push_back({Verdict::hint, subject, program + " takes cameras that are plugged in",
@@ -300,6 +326,7 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   CheckRelease(findings);
   if (config.motion_driver != MotionDriver::tic) CheckRealTime(findings, config.gpio.real_time);
   CheckTics(findings, config);
+  CheckKernelCameras(findings, config);
   CheckLibcamera(findings, config);
   CheckStillCameras(findings, config);
   CheckLight(findings, config.light);
