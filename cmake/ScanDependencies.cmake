@@ -10,6 +10,8 @@ find_package(tomlplusplus REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(OpenSSL REQUIRED)
 find_package(JPEG REQUIRED)
+find_package(PNG REQUIRED)
+find_package(TIFF REQUIRED)
 find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs)
 pkg_check_modules(libexif REQUIRED IMPORTED_TARGET libexif)
 # 1.6 in Debian 12, 2.x in Debian 13: another interface, so each has a file of its own.

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
+
+#include "drivers/camera/decode_picture.h"
 
 namespace scan {
 namespace {
@@ -34,17 +35,6 @@ bool HasTiffHead(std::span<const std::byte> bytes) {
          Contains(head, std::array<unsigned char, 4>{'M', 'M', 0, 42});
 }
 
-cv::Mat Decode(std::span<const std::byte> bytes) {
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
-                         const_cast<std::byte*>(bytes.data()));
-    return cv::imdecode(buffer,
-                        cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const cv::Exception&) {
-    return {};
-  }
-}
-
 }  // namespace
 
 std::optional<std::string> FindPictureFault(std::string_view extension,
@@ -60,9 +50,9 @@ std::optional<std::string> FindPictureFault(std::string_view extension,
   if (extension != "jpg" && extension != "png" && extension != "tif")
     return "'" + name + "' is no picture format of a session";
   if (!HasEnd(extension, bytes)) return "the " + name + " is cut off before its end mark";
-  const cv::Mat picture = Decode(bytes);
-  if (picture.empty()) return "the " + name + " does not decode";
-  size = PictureSize{picture.cols, picture.rows};
+  const auto picture = DecodePicture(extension, bytes);
+  if (!picture) return "the " + name + " does not decode: " + picture.error().what;
+  size = PictureSize{picture->cols, picture->rows};
   return std::nullopt;
 }
 

@@ -94,7 +94,7 @@ Json ToJson(const std::vector<FileDocument>& files) {
   return json;
 }
 
-Result<AxisReading> AxisFrom(const JsonObject& object) {
+Result<AxisReading> AxisReadingFrom(const JsonObject& object) {
   AxisReading axis;
   SCAN_TRY(axis.commanded, object.Number("commanded"));
   SCAN_TRY(axis.counted, object.Number("counted"));
@@ -110,11 +110,11 @@ Result<FrameAxes> AxesFrom(const JsonObject& object) {
   FrameAxes axes;
   SCAN_TRY(const auto turntable, object.OptionalObject("turntable_deg"));
   if (turntable) {
-    SCAN_TRY(axes.turntable_deg, AxisFrom(*turntable));
+    SCAN_TRY(axes.turntable_deg, AxisReadingFrom(*turntable));
   }
   SCAN_TRY(const auto lift, object.OptionalObject("lift_mm"));
   if (lift) {
-    SCAN_TRY(axes.lift_mm, AxisFrom(*lift));
+    SCAN_TRY(axes.lift_mm, AxisReadingFrom(*lift));
   }
   return axes;
 }
@@ -123,9 +123,9 @@ Result<StagePosition> PositionFrom(const JsonObject& object) {
   SCAN_TRY(const JsonObject axes, object.Object("axes"));
   StagePosition position;
   SCAN_TRY(const JsonObject turntable, axes.Object("turntable_deg"));
-  SCAN_TRY(position.turntable_deg, AxisFrom(turntable));
+  SCAN_TRY(position.turntable_deg, AxisReadingFrom(turntable));
   SCAN_TRY(const JsonObject lift, axes.Object("lift_mm"));
-  SCAN_TRY(position.lift_mm, AxisFrom(lift));
+  SCAN_TRY(position.lift_mm, AxisReadingFrom(lift));
   return position;
 }
 

@@ -5,8 +5,8 @@
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
-#include <opencv2/imgcodecs.hpp>
-#include <vector>
+
+#include "drivers/camera/png_file.h"
 
 namespace scan {
 namespace {
@@ -72,16 +72,7 @@ Result<EncodedFile> EncodePicture(const cv::Mat& bgr, const std::string& format,
     return file;
   }
   if (format != "png") return BadInput("unknown format", format, "choose jpg or png");
-  try {
-    std::vector<std::uint8_t> encoded;
-    if (!cv::imencode(".png", bgr, encoded, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
-      return Failed("picture could not be encoded", "png", "check the picture's size");
-    }
-    const auto* bytes = reinterpret_cast<const std::byte*>(encoded.data());
-    file.bytes.assign(bytes, bytes + encoded.size());
-  } catch (const cv::Exception& e) {
-    return Failed(e.what(), "png", "check the picture's size");
-  }
+  SCAN_TRY(file.bytes, EncodePngFile(bgr));
   return file;
 }
 

@@ -11,7 +11,6 @@ void AddAllCommands(CommandSet& commands) {
   AddStationControl(commands);
   AddReplay(commands);
   AddVerify(commands);
-  AddImport(commands);
   CLI::App& device = commands.AddGroup(nullptr, "device", "Devices tried by hand");
   AddCameraDevices(commands, device);
   AddLibcameraDevices(commands, device);
@@ -21,6 +20,7 @@ void AddAllCommands(CommandSet& commands) {
   AddTmcDevices(commands, device);
   AddDoctor(commands);
 #ifdef SCAN_RECONSTRUCTION
+  AddImport(commands);
   AddSurface(commands);
   AddAtlas(commands);
   AddMasks(commands);

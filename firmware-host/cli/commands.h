@@ -36,6 +36,8 @@ void AddPtpDevices(CommandSet& commands, CLI::App& device);
 // session_commands.cpp
 void AddReplay(CommandSet& commands);
 void AddVerify(CommandSet& commands);
+
+// import_command.cpp
 void AddImport(CommandSet& commands);
 
 // model_commands.cpp

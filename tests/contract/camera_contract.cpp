@@ -1,6 +1,6 @@
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 
+#include "drivers/camera/decode_picture.h"
 #include "tests/contract/twin.h"
 
 namespace scan {
@@ -12,11 +12,10 @@ TEST_P(CameraContract, AFrameIsAPictureOfTheSizeTheCameraStates) {
   ASSERT_FALSE(frame->files.empty());
   const EncodedFile& file = frame->files.front();
   ASSERT_TRUE(file.extension == "jpg" || file.extension == "png" || file.extension == "tif");
-  const cv::Mat bytes(1, static_cast<int>(file.bytes.size()), CV_8U,
-                      const_cast<std::byte*>(file.bytes.data()));
-  const cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-  EXPECT_EQ(picture.cols, device().Info().w);
-  EXPECT_EQ(picture.rows, device().Info().h);
+  const auto picture = DecodePicture(file.extension, file.bytes);
+  ASSERT_TRUE(picture) << ToString(picture.error());
+  EXPECT_EQ(picture->cols, device().Info().w);
+  EXPECT_EQ(picture->rows, device().Info().h);
 }
 
 TEST_P(CameraContract, EveryExposureBeginsAfterItsCall) {

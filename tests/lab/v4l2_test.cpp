@@ -12,10 +12,10 @@
 #include <fstream>
 #include <map>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <thread>
 
+#include "drivers/camera/decode_picture.h"
 #include "drivers/camera/v4l2/convert.h"
 #include "drivers/camera/v4l2/kernel_v4l2.h"
 #include "drivers/camera/v4l2/v4l2_camera.h"
@@ -232,10 +232,9 @@ INSTANTIATE_TEST_SUITE_P(Formats, UsbCamera, ::testing::ValuesIn(Formats()),
 
 // The picture is as bright as the exposure that its maker was set to.
 double Brightness(const Frame& frame) {
-  const cv::Mat bytes(1, static_cast<int>(frame.files.front().bytes.size()), CV_8U,
-                      const_cast<std::byte*>(frame.files.front().bytes.data()));
-  const cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
-  return cv::mean(picture.rowRange(picture.rows / 2, picture.rows))[0];
+  const EncodedFile& file = frame.files.front();
+  const cv::Mat picture = DecodePicture(file.extension, file.bytes).value();
+  return cv::mean(picture.rowRange(picture.rows / 2, picture.rows))[1];  // green
 }
 
 TEST_P(UsbCamera, AnExposureThatWasSetIsSeenInThePicture) {
@@ -300,14 +299,14 @@ TEST_F(ColourBars, AreTheSameInEveryFormat) {
     ASSERT_TRUE(camera) << ToString(camera.error());
     const auto frame = (*camera)->Grab({});
     ASSERT_TRUE(frame) << ToString(frame.error());
-    const cv::Mat bytes(1, static_cast<int>(frame->files.front().bytes.size()), CV_8U,
-                        const_cast<std::byte*>(frame->files.front().bytes.data()));
-    pictures[format] = cv::imdecode(bytes, cv::IMREAD_COLOR);
+    const EncodedFile& file = frame->files.front();
+    const auto picture = DecodePicture(file.extension, file.bytes);
+    ASSERT_TRUE(picture) << ToString(picture.error());
+    pictures[format] = *picture;
     if (const char* out = std::getenv("LAB_PICTURES"))
-      std::ofstream(fs::path(out) / (format + "." + frame->files.front().extension),
-                    std::ios::binary)
-          .write(reinterpret_cast<const char*>(frame->files.front().bytes.data()),
-                 static_cast<std::streamsize>(frame->files.front().bytes.size()));
+      std::ofstream(fs::path(out) / (format + "." + file.extension), std::ios::binary)
+          .write(reinterpret_cast<const char*>(file.bytes.data()),
+                 static_cast<std::streamsize>(file.bytes.size()));
   }
   ASSERT_TRUE(pictures.contains("RGB3"));
   const cv::Mat& reference = pictures.at("RGB3");

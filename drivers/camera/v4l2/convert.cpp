@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "drivers/camera/encode_picture.h"
-#include "drivers/camera/v4l2/jpeg_decode.h"
+#include "drivers/camera/jpeg_decode.h"
 
 namespace scan {
 namespace {

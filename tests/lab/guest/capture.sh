@@ -22,7 +22,7 @@ page() { # METHOD PATH
     page POST '/api/answer?confirmed=yes' | grep -q '200 OK'
   done
 ) &
-"$LAB_BIN/scanstation" capture --socket daemon.sock --out /out/session
-"$LAB_BIN/scanstation" verify /out/session
+"$LAB_BIN/lab_scanstation" capture --socket daemon.sock --out /out/session
+"$LAB_BIN/lab_scanstation" verify /out/session
 kill $daemon
 wait $daemon

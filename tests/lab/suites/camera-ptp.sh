@@ -2,7 +2,7 @@
 # limit: 600
 PTP_SCENE=()
 . "$LAB_DIR/guest/ptp.sh"
-ptp() { "$LAB_BIN/scanstation" device ptp "$@"; }
+ptp() { "$LAB_BIN/lab_scanstation" device ptp "$@"; }
 ptp list
 ptp list --json | grep -q '"serial LAB0002"'
 port=$(ptp list --json | sed -n 's/.*"port": "\([^"]*\)".*/\1/p')

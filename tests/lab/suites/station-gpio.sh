@@ -4,7 +4,7 @@
 . "$LAB_DIR/guest/gpio.sh"
 config=$LAB_DIR/../../configs/station-lab.toml
 sock=$PWD/motiond.sock
-device() { timeout 120 "$LAB_BIN/scanstation" device "$@"; }
+device() { timeout 120 "$LAB_BIN/lab_scanstation" device "$@"; }
 mkfifo ask
 "$LAB_BIN/lab_motor" state -400 300 <ask >ready &
 exec 3>ask
@@ -25,7 +25,7 @@ start() { # the socket of one that was killed is still there
 
 device gpio list | tee list
 grep -q 'TURNTABLE_STEP' list
-"$LAB_BIN/scanstation" doctor --config "$config" --json >doctor
+"$LAB_BIN/lab_scanstation" doctor --config "$config" --json >doctor
 grep -q '"ready": true' doctor
 start
 device gpio list | grep -q "TURNTABLE_STEP *held by 'scanstation turntable step'"
@@ -43,7 +43,7 @@ echo "figure: moved by hand through scanstation-motiond: 1250 and 2250 steps, as
 # The lamp is lit as long as its client lives, and nobody else switches it meanwhile.
 lamp() { cat "$GPIO_SYSFS/sim_gpio11/value"; }
 [ "$(lamp)" = 0 ]
-"$LAB_BIN/scanstation" device light on --socket "$sock" &
+"$LAB_BIN/lab_scanstation" device light on --socket "$sock" &
 client=$!
 until [ "$(lamp)" = 1 ]; do sleep 0.2; done
 fails device light off --socket "$sock" 2>refused

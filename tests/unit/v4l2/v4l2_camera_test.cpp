@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/camera/v4l2/jpeg_decode.h"
+#include "drivers/camera/jpeg_decode.h"
 #include "tests/support/v4l2_bench.h"
 
 namespace scan {

@@ -1,4 +1,4 @@
-#include "acquisition/session/import.h"
+#include "acquisition/import/import.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "acquisition/session/import_sources.h"
+#include "acquisition/import/sources.h"
 #include "acquisition/session/json_fields.h"
 #include "acquisition/session/photo_set.h"
 #include "acquisition/session/picture_header.h"

@@ -1,4 +1,4 @@
-#include "acquisition/session/import.h"
+#include "acquisition/import/import.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <sstream>
 
-#include "acquisition/session/import_sources.h"
+#include "acquisition/import/sources.h"
 #include "acquisition/session/picture_header.h"
 #include "drivers/base/files.h"
 

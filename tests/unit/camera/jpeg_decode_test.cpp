@@ -1,4 +1,4 @@
-#include "drivers/camera/v4l2/jpeg_decode.h"
+#include "drivers/camera/jpeg_decode.h"
 
 #include <gtest/gtest.h>
 

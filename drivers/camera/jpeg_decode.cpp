@@ -1,4 +1,4 @@
-#include "drivers/camera/v4l2/jpeg_decode.h"
+#include "drivers/camera/jpeg_decode.h"
 
 #include <jerror.h>
 #include <jpeglib.h>
@@ -14,14 +14,14 @@
 namespace scan {
 namespace {
 
-struct JpegError {
+struct JpegFault {
   jpeg_error_mgr manager;  // first: libjpeg hands out its address
   std::jmp_buf jump;
   char text[JMSG_LENGTH_MAX];
 };
 
 [[noreturn]] void OnError(j_common_ptr info) {
-  auto* error = reinterpret_cast<JpegError*>(info->err);
+  auto* error = reinterpret_cast<JpegFault*>(info->err);
   info->err->format_message(info, error->text);
   std::longjmp(error->jump, 1);
 }
@@ -40,7 +40,7 @@ struct JpegHead {
 // A decoder between setjmp and longjmp: plain C, nothing here has a destructor.
 struct JpegDecoder {
   jpeg_decompress_struct info;
-  JpegError error;
+  JpegFault error;
 };
 
 // Reads the header, then does `work`; false when libjpeg found an error on the way.

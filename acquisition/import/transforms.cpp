@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "acquisition/import/sources.h"
 #include "acquisition/session/document_json.h"
-#include "acquisition/session/import_sources.h"
 #include "acquisition/session/json_fields.h"
 #include "acquisition/session/picture_header.h"
 #include "drivers/base/files.h"
