@@ -194,5 +194,17 @@ TEST(WorkerCamera, ListsTheCamerasOfItsProgram) {
   EXPECT_EQ(cameras->front(), (CameraListing{"sim", "simulated", {"120 x 80", "no cable"}}));
 }
 
+TEST(WorkerCamera, AnAnswerThatIsTooLongIsSaidAtOnce) {
+  const auto cameras = ListWorkerCameras(ThreadProgram([](UniqueFd socket) {
+    CameraWorkerRole role;
+    role.list = []() -> Result<std::vector<CameraListing>> {
+      return std::vector<CameraListing>{{"sim", "simulated", {std::string(100'000, 'x')}}};
+    };
+    ServeCamera(std::move(socket), role);
+  }));
+  ASSERT_FALSE(cameras);
+  EXPECT_EQ(cameras.error().kind, ErrorKind::bad_input) << ToString(cameras.error());
+}
+
 }  // namespace
 }  // namespace scan

@@ -1,5 +1,7 @@
 // What the owner of a worker of libgphoto2 says to it, and asks of it.
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/time.h>
 
 #include "firmware-host/camera_worker/ptp_options.h"
 #include "firmware-host/camera_worker/worker_tool.h"
@@ -79,6 +81,19 @@ TEST(WorkerTool, WhatDiesHangsOrTalksNonsenseIsADeviceFault) {
   const auto absent = RunWorkerTool("/nonexistent/program", {}, milliseconds(20'000));
   ASSERT_FALSE(absent);
   EXPECT_EQ(absent.error().kind, ErrorKind::failed);
+}
+
+TEST(WorkerTool, ASignalDoesNotMakeItWaitForEver) {
+  struct sigaction heard {
+  }, before{};
+  heard.sa_handler = [](int) {};  // without SA_RESTART: calls that wait are interrupted
+  ASSERT_EQ(sigaction(SIGALRM, &heard, &before), 0);
+  const itimerval once{{0, 0}, {0, 100'000}};
+  setitimer(ITIMER_REAL, &once, nullptr);
+  const auto answer = RunWorkerTool("/bin/sleep", {"1000"}, milliseconds(500));
+  sigaction(SIGALRM, &before, nullptr);
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().what, "the camera does not answer");
 }
 
 }  // namespace
