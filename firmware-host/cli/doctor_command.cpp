@@ -34,6 +34,11 @@ struct Finding {
   std::string subject, what, mend;
 };
 
+// Without how to mend it, which a finding says by itself.
+std::string WhatAndWhere(const Error& error) {
+  return error.where.empty() ? error.what : fmt::format("{}: {}", error.what, error.where);
+}
+
 constexpr const char* kVerdictNames[] = {"good", "hint", "bad"};
 
 void CheckChips(std::vector<Finding>& findings, bool needed) {
@@ -71,7 +76,7 @@ void CheckLines(std::vector<Finding>& findings, const GpioMotionConfig& gpio) {
   const auto chips = ListGpiodChips();
   const auto place = FindGpioLines(chips, request);
   if (!place) {
-    findings.push_back({Verdict::bad, "lines", ToString(place.error()), place.error().mend});
+    findings.push_back({Verdict::bad, "lines", WhatAndWhere(place.error()), place.error().mend});
     return;
   }
   const GpioChipInfo& chip = chips[place->chip];
@@ -136,7 +141,8 @@ std::string Text(const UsbIdentity& board) {
 void CheckTics(std::vector<Finding>& findings, const StationConfig& config) {
   const bool needed = config.motion_driver == MotionDriver::tic;
   const auto add_error = [&](const Error& error) {
-    findings.push_back({needed ? Verdict::bad : Verdict::hint, "USB", ToString(error), error.mend});
+    findings.push_back(
+        {needed ? Verdict::bad : Verdict::hint, "USB", WhatAndWhere(error), error.mend});
   };
   const auto bus = MakeLibusbBus();
   if (!bus) return add_error(bus.error());
@@ -202,7 +208,7 @@ void CheckLibcamera(std::vector<Finding>& findings, const StationConfig& config)
   const auto listed = ListLibcameras();
   if (!listed) {
     findings.push_back({needed ? Verdict::bad : Verdict::hint, "libcamera",
-                        ToString(listed.error()), listed.error().mend});
+                        WhatAndWhere(listed.error()), listed.error().mend});
     return;
   }
   std::vector<LibcameraEntry> cameras;
@@ -231,7 +237,7 @@ void CheckStillCameras(std::vector<Finding>& findings, const StationConfig& conf
     const std::string subject = "camera " + camera.id;
     const auto info = AskPtp("info", camera.ptp, {});
     if (!info) {
-      findings.push_back({Verdict::bad, subject, ToString(info.error()), info.error().mend});
+      findings.push_back({Verdict::bad, subject, WhatAndWhere(info.error()), info.error().mend});
       continue;
     }
     const double battery_percent = info->value("battery_percent", -1.0);
@@ -277,7 +283,7 @@ void CheckLight(std::vector<Finding>& findings, const LightConfig& light) {
     const auto chips = ListGpiodChips();
     const auto place = FindGpioLines(chips, {light.chip, "", {{light.line.name}}});
     if (!place) {
-      findings.push_back({Verdict::bad, "light", ToString(place.error()), place.error().mend});
+      findings.push_back({Verdict::bad, "light", WhatAndWhere(place.error()), place.error().mend});
       return;
     }
     const GpioChipInfo& chip = chips[place->chip];
@@ -311,7 +317,8 @@ Result<CommandOutput> RunDoctor(const std::filesystem::path& config_path) {
   if (!config_path.empty()) {
     const auto read = LoadStationConfig(config_path);
     if (!read) {
-      findings.push_back({Verdict::bad, "station file", ToString(read.error()), read.error().mend});
+      findings.push_back(
+          {Verdict::bad, "station file", WhatAndWhere(read.error()), read.error().mend});
     } else {
       config = *read;
       findings.push_back({Verdict::good, "station file", config.name, ""});
