@@ -64,7 +64,7 @@ class PwmLamp final : public Lamp {
     std::string mend = "check the overlay that makes this output, and light.period_us";
     if (error == EBUSY) mend = "another driver of the kernel uses it: choose another channel";
     if (error == EACCES || error == EPERM) {
-      mend = "give this user the files below /sys/class/pwm (a udev rule with GROUP=\"gpio\")";
+      mend = "copy udev/60-scanstation.rules to /etc/udev/rules.d, add this user to the group gpio";
     }
     return DeviceFault(fmt::format("cannot {}: {}", what, std::strerror(error)), Where(), mend);
   }

@@ -45,7 +45,7 @@ std::optional<Rule> ParseRule(const std::string& line) {
     const bool matches = match[2] == "==" || match[2] == "!=";
     if (kMatchOnly.contains(name) && !matches) return std::nullopt;
     if (kAssignOnly.contains(name) && matches) return std::nullopt;
-    static const std::set<std::string> others{"ENV", "ATTR", "ATTRS", "SYMLINK", "TAG"};
+    static const std::set<std::string> others{"ENV", "ATTR", "ATTRS", "SYMLINK", "TAG", "RUN"};
     if (!kMatchOnly.contains(name) && !kAssignOnly.contains(name) && !others.contains(name)) {
       return std::nullopt;
     }
@@ -161,6 +161,9 @@ TEST(UdevRules, CamerasAndLinesHaveTheirGroupsOtherDevicesAreLeftAlone) {
                      {"ATTR{idVendor}", "1ffb"},
                      {"ATTR{idProduct}", "0089"}})
                   .empty());
+  const auto pwm = Apply({{"SUBSYSTEM", "pwm"}, {"KERNEL", "pwmchip0"}});
+  ASSERT_EQ(pwm.count("RUN"), 1U);
+  EXPECT_THAT(pwm.find("RUN")->second, HasSubstr("chgrp -R gpio /sys%p"));
   EXPECT_TRUE(Apply({{"SUBSYSTEM", "block"}, {"KERNEL", "sda"}}).empty());
 }
 
