@@ -76,6 +76,7 @@ class RigModel {
   RigModel(const PhotoSet& photos, const RigPriors& priors);
 
   const RigPriors& priors() const { return priors_; }
+  void set_ct_scale_sigma(double relative) { priors_.ct_scale_rel = relative; }
   std::span<const RigView> views() const { return views_; }
   const std::vector<std::string>& mounting_ids() const { return mounting_ids_; }
   const std::vector<int>& epoch_ids() const { return epoch_ids_; }

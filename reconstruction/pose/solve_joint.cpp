@@ -10,6 +10,7 @@
 #include "reconstruction/pose/observability.h"
 #include "reconstruction/pose/picture_cost.h"
 #include "reconstruction/pose/pose_input.h"
+#include "reconstruction/pose/stated_scale.h"
 
 namespace scan {
 namespace {
@@ -223,6 +224,24 @@ std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigMode
   return free;
 }
 
+// Residuals of a good fit leave nothing to ask: the scale is looked at only above a pixel of a
+// picture 1848 px wide.
+void RejectRefutedScale(const ContourMesh& mesh, const RigModel& rig,
+                        std::span<const PhotoContour> photos, const std::vector<bool>& views,
+                        const RefineResult& fit, RefineOptions refine, double scale,
+                        std::vector<Judgement>& judgements, std::stop_token stop) {
+  const auto stands = [&](std::size_t i) {
+    return rig.views()[i].logged && judgements[i].reason.empty();
+  };
+  bool any = false;
+  for (std::size_t i = 0; i < judgements.size(); ++i) any |= stands(i);
+  if (!any || PooledSigma(fit.fits, views) < scale) return;
+  refine.first_window_px = 4 * refine.last_window_px;
+  const std::string reason = RefutedScale(mesh, rig, photos, views, fit, refine, stop);
+  for (std::size_t i = 0; i < judgements.size(); ++i)
+    if (stands(i)) judgements[i].reason = reason;
+}
+
 }  // namespace
 
 Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
@@ -270,6 +289,7 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
     fit = RefineJoint(contour_mesh, rig, contours, agree, fit.parameters, again, stop);
     judgements = Judge(contour_mesh, rig, contours, fit, agree, options, scale, refine.spacing_px);
   }
+  RejectRefutedScale(contour_mesh, rig, contours, agree, fit, refine, scale, judgements, stop);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
   ObservabilityOptions observability;
