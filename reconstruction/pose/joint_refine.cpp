@@ -13,22 +13,6 @@ namespace {
 constexpr int kEstimates = 2;
 constexpr double kBinaryVariance = 1.0 / 12.0;  // px^2, quantisation of a binary mask
 
-ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
-                double window_px, double correlation_px, const RefineOptions& options) {
-  ViewFit fit;
-  const auto samples =
-      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, options.spacing_px);
-  fit.match = MatchContour(samples, photo, state.mask_bias_px, window_px);
-  const double floor = std::sqrt(options.sigma_floor_px * options.sigma_floor_px +
-                                 (photo.binary ? kBinaryVariance : 0.0));
-  fit.sigma_px = std::max(RobustSigma(fit.match.matches), floor);
-  EvidenceWeights weights;
-  weights.sigma_px = fit.sigma_px;
-  weights.correlation_px = correlation_px;
-  fit.evidence = Condense(state, fit.match.matches, state.camera_from_model * mesh.centre, weights);
-  return fit;
-}
-
 double PooledCorrelation(std::span<const ViewFit> fits) {
   std::vector<std::span<const ContourMatch>> views;
   for (const ViewFit& fit : fits) views.emplace_back(fit.match.matches);
@@ -46,6 +30,22 @@ double MotionPx(const ContourMesh& mesh, const CameraFromModel& a, const CameraF
 }
 
 }  // namespace
+
+ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+                double window_px, double correlation_px, const RefineOptions& options) {
+  ViewFit fit;
+  const auto samples =
+      FindContourSamples(mesh, state.camera_from_model, state.intrinsics, options.spacing_px);
+  fit.match = MatchContour(samples, photo, state.mask_bias_px, window_px);
+  const double floor = std::sqrt(options.sigma_floor_px * options.sigma_floor_px +
+                                 (photo.binary ? kBinaryVariance : 0.0));
+  fit.sigma_px = std::max(RobustSigma(fit.match.matches), floor);
+  EvidenceWeights weights;
+  weights.sigma_px = fit.sigma_px;
+  weights.correlation_px = correlation_px;
+  fit.evidence = Condense(state, fit.match.matches, state.camera_from_model * mesh.centre, weights);
+  return fit;
+}
 
 std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
                               std::span<const PhotoContour> photos, const std::vector<bool>& use,

@@ -50,6 +50,10 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
                          const RigParameters& start, const RefineOptions& options,
                          std::stop_token stop);
 
+// Matches and condenses one photograph at `state`. Thread contract: pure.
+ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
+                double window_px, double correlation_px, const RefineOptions& options);
+
 // Matches and condenses every view in use at given parameters, without solving.
 std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
                               std::span<const PhotoContour> photos, const std::vector<bool>& use,

@@ -101,8 +101,8 @@ void DescribeShared(const PhotoSet& photos, const RigModel& rig, const RigPoster
                               "axis_shift_y_mm"};
   for (int k = 0; k < 4; ++k)
     poses.nuisances[axis_names[k]] = EstimateAt(posterior, layout.axis() + k, parameters.axis[k]);
-  for (std::size_t i = 0; i < rig.epoch_ids().size(); ++i) {
-    poses.nuisances[fmt::format("turntable_offset_rad_epoch_{}", rig.epoch_ids()[i])] =
+  for (std::size_t i = 0; i < rig.epoch_names().size(); ++i) {
+    poses.nuisances[fmt::format("turntable_offset_rad_epoch_{}", rig.epoch_names()[i])] =
         EstimateAt(posterior, layout.epoch(static_cast<int>(i)), parameters.epochs[i]);
   }
   for (std::size_t i = 0; i < rig.mounting_ids().size(); ++i) {

@@ -34,11 +34,11 @@ RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(pr
     RigView view;
     const auto nominal = scan::NominalCameraFromTable(photos, photo);
     view.mounting = IndexOf(mounting_ids_, nominal ? photo.mounting_id : ' ' + photo.id);
-    view.epoch = IndexOf(epoch_ids_, photo.reference_epoch);
+    view.epoch = IndexOf(epoch_names_, std::to_string(photo.reference_epoch));
     view.aim = photo.aim;
     view.lens = photos.aims[photo.aim].lens_state;
     view.lift_direction = photos.lift_direction_in_station.normalized();
-    epoch_sigma_rad_.resize(epoch_ids_.size(), 0);
+    epoch_sigma_rad_.resize(epoch_names_.size(), 0);
     if (nominal) {
       view.logged = true;
       view.turns = photo.turntable_rad.has_value();
@@ -70,10 +70,38 @@ void RigModel::set_view_start(int view, const CameraFromModel& camera_from_model
                      camera_from_model.translation() - v.camera_from_station.translation());
 }
 
+int RigModel::SplitEpoch(int first_view, const std::string& name, double sigma_rad,
+                         RigParameters& parameters) {
+  const int before = views_[static_cast<std::size_t>(first_view)].epoch;
+  const int after = static_cast<int>(epoch_names_.size());
+  epoch_names_.push_back(name);
+  epoch_sigma_rad_.push_back(sigma_rad);
+  parameters.epochs.push_back(parameters.epochs[static_cast<std::size_t>(before)]);
+  for (auto i = static_cast<std::size_t>(first_view); i < views_.size(); ++i)
+    if (views_[i].epoch == before) views_[i].epoch = after;
+  return after;
+}
+
+int RigModel::SplitMounting(int first_view, const std::string& id, RigParameters& parameters) {
+  const int before = views_[static_cast<std::size_t>(first_view)].mounting;
+  const int after = static_cast<int>(mounting_ids_.size());
+  mounting_ids_.push_back(id);
+  start_.push_back(TableFromModel(start_[static_cast<std::size_t>(before)]));
+  const std::array<double, 6> placing = parameters.mountings[static_cast<std::size_t>(before)];
+  parameters.mountings.push_back(placing);
+  for (auto i = static_cast<std::size_t>(first_view); i < views_.size(); ++i)
+    if (views_[i].mounting == before) views_[i].mounting = after;
+  return after;
+}
+
+void RigModel::ReverseTurntable() {
+  for (RigView& view : views_) view.turntable_rad = -view.turntable_rad;
+}
+
 RigParameters RigModel::Nominal() const {
   RigParameters p;
   p.mountings.resize(mounting_ids_.size(), {});
-  p.epochs.resize(epoch_ids_.size(), 0);
+  p.epochs.resize(epoch_names_.size(), 0);
   p.aims.resize(aim_sigma_.size(), {});
   p.lenses.resize(intrinsics_.size(), {});
   p.views.resize(views_.size(), {});

@@ -79,7 +79,8 @@ class RigModel {
   void set_ct_scale_sigma(double relative) { priors_.ct_scale_rel = relative; }
   std::span<const RigView> views() const { return views_; }
   const std::vector<std::string>& mounting_ids() const { return mounting_ids_; }
-  const std::vector<int>& epoch_ids() const { return epoch_ids_; }
+  // "1" for the session's reference epoch 1; "1_from_v009" for what was split off from it.
+  const std::vector<std::string>& epoch_names() const { return epoch_names_; }
   // A mounting that is one view without a nominal pose.
   static bool IsViewMounting(const std::string& id) { return id.starts_with(' '); }
   // For such a view: its start, and the specimen's distance with it.
@@ -100,6 +101,15 @@ class RigModel {
   bool held(int lens, int parameter) const { return held_[lens][parameter]; }
   void set_held(int lens, int parameter, bool held) { held_[lens][parameter] = held; }
 
+  // From `first_view` on the views of its epoch get a turntable offset of their own, those of its
+  // mounting a placing of their own; `parameters` grows by it, equal to what it was split from.
+  // Return the new index.
+  int SplitEpoch(int first_view, const std::string& name, double sigma_rad,
+                 RigParameters& parameters);
+  int SplitMounting(int first_view, const std::string& id, RigParameters& parameters);
+  // The turntable turns against the sign of its log.
+  void ReverseTurntable();
+
   RigParameters Nominal() const;
 
   CameraFromTable NominalCameraFromTable(int view) const;
@@ -113,7 +123,7 @@ class RigModel {
   RigPriors priors_;
   std::vector<RigView> views_;
   std::vector<std::string> mounting_ids_;
-  std::vector<int> epoch_ids_;
+  std::vector<std::string> epoch_names_;
   std::vector<double> epoch_sigma_rad_;
   std::vector<RigidSigma> aim_sigma_;
   std::vector<IntrinsicsSigma> lens_sigma_;

@@ -147,7 +147,7 @@ using ViewMotionFunction =
 
 RigLayout::RigLayout(const RigModel& rig) {
   epochs_ = 6 * static_cast<int>(rig.mounting_ids().size());
-  aims_ = epochs_ + static_cast<int>(rig.epoch_ids().size());
+  aims_ = epochs_ + static_cast<int>(rig.epoch_names().size());
   axis_ = aims_ + 6 * static_cast<int>(rig.aim_sigma().size());
   lenses_ = axis_ + 4;
   bias_ = lenses_ + 3 * static_cast<int>(rig.lens_sigma().size());
@@ -167,7 +167,7 @@ Eigen::VectorXd PriorSigmas(const RigModel& rig, const RigLayout& layout) {
   };
   for (int i = 0; i < static_cast<int>(rig.mounting_ids().size()); ++i)
     rigid(layout.mounting(i), {priors.mounting_rotation_rad, priors.mounting_translation_mm});
-  for (int i = 0; i < static_cast<int>(rig.epoch_ids().size()); ++i)
+  for (int i = 0; i < static_cast<int>(rig.epoch_names().size()); ++i)
     sigma[layout.epoch(i)] = std::max(rig.epoch_sigma_rad(i), kRotation);
   for (int i = 0; i < static_cast<int>(rig.aim_sigma().size()); ++i)
     rigid(layout.aim(i), rig.aim_sigma()[i]);

@@ -5,11 +5,12 @@
 
 #include <algorithm>
 
-#include "reconstruction/pose/choose_start.h"
 #include "reconstruction/pose/joint_result.h"
 #include "reconstruction/pose/observability.h"
 #include "reconstruction/pose/picture_cost.h"
 #include "reconstruction/pose/pose_input.h"
+#include "reconstruction/pose/rig_attempt.h"
+#include "reconstruction/pose/rig_notes.h"
 #include "reconstruction/pose/stated_scale.h"
 
 namespace scan {
@@ -111,6 +112,33 @@ std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
   return judgements;
 }
 
+constexpr const char* kReversedNote =
+    "The turntable runs the other way than its log says: with every angle negated the outlines "
+    "fit. Mend the sign of the turntable in the station file.";
+
+// Views that the change analysis took out say why, where their own outline has a pose to show.
+void RejectViewsAlone(const ContourMesh& mesh, const RigModel& rig,
+                      std::span<const PhotoContour> photos, const RigParameters& parameters,
+                      std::span<const RigChange> changes, const RefineOptions& refine,
+                      std::vector<Judgement>& judgements) {
+  std::vector<bool> alone(photos.size(), false);
+  for (const RigChange& change : changes)
+    if (change.kind == RigChange::Kind::view_alone) alone[change.view] = true;
+  const RigEvidence seen = EvidenceOfViewsAlone(mesh, rig, photos, alone, parameters,
+                                                refine.correlation_floor_px, refine);
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    if (!seen[i]) continue;
+    const double unit = refine.last_window_px / 8;
+    const Explained explained =
+        ExplainedShares(mesh, photos[i], seen[i]->state, 1.5 * unit + 0.5, refine.spacing_px);
+    const bool has_pose = RejectionReason(explained, 0, {}).empty();
+    if (!has_pose && !judgements[i].reason.empty()) continue;
+    judgements[i].reason =
+        ReasonOfViewAlone(seen[i]->state.camera_from_model,
+                          rig.CameraFromModelOf(parameters, static_cast<int>(i)), mesh.centre);
+  }
+}
+
 Poses Describe(const ContourMesh& mesh, const PhotoSet& photos, std::span<const Mask> masks,
                const RigModel& rig, const RefineResult& fit, const RigPosterior& posterior,
                std::span<const Judgement> judgements) {
@@ -125,7 +153,9 @@ Poses Describe(const ContourMesh& mesh, const PhotoSet& photos, std::span<const 
     view.name = photo.name;
     view.aim = photos.aims[photo.aim].id;
     view.lens_state = photos.lens_states[photos.aims[photo.aim].lens_state].id;
-    view.mounting = photo.mounting_id;
+    // A part of a mounting where the specimen was moved on the table.
+    view.mounting =
+        rig.views()[i].logged ? rig.mounting_ids()[rig.views()[i].mounting] : photo.mounting_id;
     view.reason = judgements[i].reason;
     view.status = view.reason.empty() ? ViewStatus::accepted : ViewStatus::rejected;
     view.contour_rms_px = judgements[i].explained.rms_px;
@@ -269,32 +299,41 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   const Alternatives alternatives =
       StartViewsAlone(contour_mesh, photos, contours, options, refine, rig, use, known, stop);
   if (stop.stop_requested()) return Cancelled("pose");
-  SCAN_CHECK(ChooseStarts(contour_mesh, rig, contours, use, known, options.start, refine, stop));
   Report(progress, "poses: refine", 0.5);
-  RefineResult fit = RefineJoint(contour_mesh, rig, contours, use, rig.Nominal(), refine, stop);
-  auto judgements = Judge(contour_mesh, rig, contours, fit, use, options, scale, refine.spacing_px);
+  std::vector<std::string> names;
+  for (const Photo& photo : photos.photos) names.push_back(photo.id);
+  SCAN_TRY(RigAttempt attempt, SolveWithChanges({contour_mesh, contours, names, use, known,
+                                                 options.start, refine, options.changes},
+                                                rig, stop));
+  rig = attempt.rig;
+  RefineResult& fit = attempt.fit;
+  auto judgements =
+      Judge(contour_mesh, rig, contours, fit, attempt.use, options, scale, refine.spacing_px);
+  RefineOptions again = refine;
+  again.first_window_px = 2 * refine.last_window_px;
   if (FreeWhatIsSeen(rig, PosteriorOf(rig, fit))) {
-    RefineOptions again = refine;
-    again.first_window_px = 2 * refine.last_window_px;
-    fit = RefineJoint(contour_mesh, rig, contours, use, fit.parameters, again, stop);
-    judgements = Judge(contour_mesh, rig, contours, fit, use, options, scale, refine.spacing_px);
+    fit = RefineJoint(contour_mesh, rig, contours, attempt.use, fit.parameters, again, stop);
+    judgements =
+        Judge(contour_mesh, rig, contours, fit, attempt.use, options, scale, refine.spacing_px);
   }
   // Views that disagree are taken out and the others solved again, so that nothing of them is
   // spread; then every view is judged once more at the pose that the others give it.
-  std::vector<bool> agree = use;
-  for (std::size_t i = 0; i < use.size(); ++i) agree[i] = use[i] && judgements[i].reason.empty();
-  if (agree != use && std::any_of(agree.begin(), agree.end(), [](bool a) { return a; })) {
-    RefineOptions again = refine;
-    again.first_window_px = 2 * refine.last_window_px;
+  std::vector<bool> agree = attempt.use;
+  for (std::size_t i = 0; i < use.size(); ++i) agree[i] = agree[i] && judgements[i].reason.empty();
+  if (agree != attempt.use && std::any_of(agree.begin(), agree.end(), [](bool a) { return a; })) {
     fit = RefineJoint(contour_mesh, rig, contours, agree, fit.parameters, again, stop);
     judgements = Judge(contour_mesh, rig, contours, fit, agree, options, scale, refine.spacing_px);
   }
   RejectRefutedScale(contour_mesh, rig, contours, agree, fit, refine, scale, judgements, stop);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
+  RejectViewsAlone(contour_mesh, rig, contours, fit.parameters, attempt.changes, refine,
+                   judgements);
   ObservabilityOptions observability;
   observability.weights.correlation_px = fit.correlation_px;
   RigPosterior posterior = PosteriorOf(rig, fit);
+  const std::vector<std::string> notes =
+      RigNotes(photos, rig, fit.parameters, posterior, attempt.changes, contour_mesh.centre);
   const auto free = FreeDirections(contour_mesh, rig, fit, judgements, observability);
   for (const FreeDirection& direction : free) AddFreedom(rig, fit.parameters, direction, posterior);
   Poses poses = Describe(contour_mesh, photos, masks, rig, fit, posterior, judgements);
@@ -304,6 +343,8 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
     poses.views[i].alternatives = alternatives[i];
   poses.nuisances["residual_sigma_px"].value = PooledSigma(fit.fits, use);
   poses.nuisances["residual_correlation_px"].value = fit.correlation_px;
+  if (attempt.reversed) poses.notes.push_back(kReversedNote);
+  poses.notes.insert(poses.notes.end(), notes.begin(), notes.end());
   for (const FreeDirection& direction : poses.free_directions)
     poses.notes.push_back(Sentence(direction));
   return poses;

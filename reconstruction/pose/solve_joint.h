@@ -16,6 +16,7 @@
 #include "reconstruction/pose/acceptance.h"
 #include "reconstruction/pose/joint_refine.h"
 #include "reconstruction/pose/poses.h"
+#include "reconstruction/pose/rig_changes.h"
 #include "reconstruction/pose/rig_model.h"
 #include "reconstruction/pose/start_search.h"
 #include "reconstruction/pose/view_start.h"
@@ -28,6 +29,7 @@ struct JointOptions {
   RefineOptions refine;  // px of a picture 1848 px wide; scaled to the photos
   AcceptanceOptions acceptance;
   StartOptions start;
+  ChangeOptions changes;
   ViewStartOptions view_start;  // for photographs without a nominal pose
   bool no_priors = false;       // logged poses are left aside, as if every photograph had none
   // Of this mesh, to share it between calls; else made when needed.

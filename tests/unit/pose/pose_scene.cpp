@@ -50,7 +50,7 @@ void AddEllipsoid(TriangleMesh& mesh, int subdivisions, const Eigen::Vector3d& c
 
 }  // namespace
 
-TriangleMesh BugMesh(int subdivisions) {
+TriangleMesh BugMesh(int subdivisions, double bent_rad) {
   TriangleMesh mesh;
   const auto add = [&](Eigen::Vector3d c, Eigen::Vector3d a, Eigen::Vector3d t) {
     AddEllipsoid(mesh, subdivisions, c, a, t);
@@ -61,7 +61,12 @@ TriangleMesh BugMesh(int subdivisions) {
   add({6, 8, 5}, {0.7, 6, 0.7}, {-0.5, 0, 0.3});      // legs, all different
   add({0, 8, 5}, {0.6, 7, 0.6}, {-0.6, 0, 0});
   add({-7, 7, 4}, {0.7, 5, 0.7}, {-0.7, 0, -0.5});
+  const auto leg = mesh.vertices.size();
   add({5, -8, 5}, {0.7, 6, 0.7}, {0.5, 0, -0.2});
+  const Eigen::Vector3d hip(4.5, -5, 6.5);
+  for (auto v = mesh.vertices.begin() + static_cast<std::ptrdiff_t>(leg); v != mesh.vertices.end();
+       ++v)
+    *v = hip + ExpSo3({bent_rad, 0, 0}) * (*v - hip);
   add({-5, -8, 4}, {0.6, 7, 0.6}, {0.5, 0, 0.6});
   return mesh;
 }
@@ -201,10 +206,21 @@ Scene MakeScene(const TriangleMesh& mesh, const TableFromModel& table_from_model
     photo.turntable_rad = AxisPrior{angle, RadFromDeg(0.1), RadFromDeg(0.02)};
     photo.lift_mm = AxisPrior{0, 0.05, 0.02};
     photos.photos.push_back(photo);
+    const SceneFaults& faults = options.faults;
+    const auto since = [i](int from) { return from >= 0 && i >= from; };
+    TableFromModel placing = table_from_model;
+    if (since(faults.turned_over_at)) placing = faults.turned_over;
+    if (since(faults.moved_from) && i < faults.moved_until)
+      placing = MovedAbout(placing, faults.moved, placing * box.centre());
+    double true_angle = faults.sign_inverted ? -angle : angle;
+    if (since(faults.steps_lost_from)) true_angle -= faults.steps_lost_rad;
+    if (since(faults.resumed_at)) true_angle += faults.resumed_zero_rad;
+    if (since(faults.turned_over_at)) scene.photos.photos.back().mounting_id = "m1";
+    if (since(faults.resumed_at)) scene.photos.photos.back().reference_epoch = 2;
     const StationFromTable turn =
-        MakeStationFromTable(angle + errors * rng.Normal() * RadFromDeg(0.01));
+        MakeStationFromTable(true_angle + errors * rng.Normal() * RadFromDeg(0.01));
     const LiftFromStation tilted(axis, errors * Eigen::Vector3d(0.2, -0.1, 0));
-    scene.truth.push_back(true_aims[photo.aim] * tilted * turn * table_from_model);
+    scene.truth.push_back(true_aims[photo.aim] * tilted * turn * placing);
     scene.true_intrinsics.push_back(true_lenses[photo.aim]);
     scene.masks.push_back(RenderMask(mesh, scene.truth.back(), true_lenses[photo.aim]));
   }

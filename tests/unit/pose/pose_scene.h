@@ -8,8 +8,23 @@
 #include "reconstruction/masks/mask.h"
 #include "reconstruction/mesh/mesh.h"
 #include "reconstruction/pose/contour_evidence.h"
+#include "reconstruction/pose/rigid_motion.h"
 
 namespace scan::test {
+
+// What goes wrong with the rig while the log does not notice; -1: never.
+struct SceneFaults {
+  int steps_lost_from = -1;
+  double steps_lost_rad = 0;
+  int moved_from = -1;        // the specimen on the table: this motion about its box's centre
+  int moved_until = 1 << 30;  // and back again
+  Vector6d moved = Vector6d::Zero();
+  int resumed_at = -1;  // another reference epoch, logged, with another zero
+  double resumed_zero_rad = 0;
+  bool sign_inverted = false;
+  int turned_over_at = -1;  // another mounting "m1", logged
+  TableFromModel turned_over;
+};
 
 struct SceneOptions {
   int w = 1848, h = 1224;
@@ -20,6 +35,7 @@ struct SceneOptions {
       false;  // focal 0.05 %, principal point 3 px, axis 0.5 deg, aims 0.2 deg 0.5 mm
   double mask_bias_px = 0;
   std::uint64_t seed = 1;
+  SceneFaults faults{};
 };
 
 struct Scene {
@@ -37,8 +53,9 @@ Mask RenderMask(const TriangleMesh& mesh, const CameraFromModel& camera_from_mod
 Scene MakeScene(const TriangleMesh& mesh, const TableFromModel& table_from_model,
                 const SceneOptions& options);
 
-// An egg-shaped body with a horn and five unequal legs, 30 mm long: overlapping closed shells.
-TriangleMesh BugMesh(int subdivisions);
+// An egg-shaped body with a horn and five unequal legs, 30 mm long: overlapping closed shells. One
+// leg may be bent where it leaves the body.
+TriangleMesh BugMesh(int subdivisions, double bent_rad = 0);
 
 // The bug from 550 mm in a picture of 924 x 612, no mask bias.
 ViewState BugView();

@@ -1,0 +1,221 @@
+// What goes wrong with a rig: found, located, named; compensated or rejected; never spread over the
+// other views. Each case is compared with the same session without the fault.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "drivers/base/units.h"
+#include "pose_scene.h"
+#include "reconstruction/pose/score.h"
+#include "reconstruction/pose/solve_joint.h"
+
+namespace scan {
+namespace {
+
+constexpr int kViews = 24;
+
+test::SceneOptions RigOptions() {
+  test::SceneOptions options;
+  options.w = 924;
+  options.h = 612;
+  options.views = kViews;
+  options.static_errors = true;
+  return options;
+}
+
+TableFromModel Placing() {
+  return TableFromModel(ExpSo3({0.05, -0.1, 1.9}), Eigen::Vector3d(1.5, -2, 3));
+}
+
+struct Outcome {
+  test::Scene scene;
+  Poses poses;
+  std::vector<double> surface_px;  // RMS, per view
+
+  std::string Notes() const {
+    std::string text;
+    for (const std::string& note : poses.notes) text += note + "\n";
+    return text;
+  }
+  double WorstOf(const std::vector<int>& left_out = {}) const {
+    double worst = 0;
+    for (int i = 0; i < static_cast<int>(surface_px.size()); ++i)
+      if (std::find(left_out.begin(), left_out.end(), i) == left_out.end())
+        worst = std::max(worst, surface_px[static_cast<std::size_t>(i)]);
+    return worst;
+  }
+  double RmsOf(const std::vector<int>& left_out = {}) const {
+    double sum = 0, count = 0;
+    for (int i = 0; i < static_cast<int>(surface_px.size()); ++i) {
+      if (std::find(left_out.begin(), left_out.end(), i) != left_out.end()) continue;
+      sum += surface_px[static_cast<std::size_t>(i)] * surface_px[static_cast<std::size_t>(i)];
+      count += 1;
+    }
+    return std::sqrt(sum / count);
+  }
+  std::vector<int> Rejected() const {
+    std::vector<int> rejected;
+    for (int i = 0; i < static_cast<int>(poses.views.size()); ++i)
+      if (poses.views[static_cast<std::size_t>(i)].status == ViewStatus::rejected)
+        rejected.push_back(i);
+    return rejected;
+  }
+};
+
+Outcome Solve(const TriangleMesh& photographed, const TriangleMesh& mesh,
+              const test::SceneOptions& options, bool placing_known = true) {
+  Outcome outcome;
+  outcome.scene = test::MakeScene(photographed, Placing(), options);
+  JointOptions joint;
+  if (placing_known) {
+    Vector6d off;
+    off << 0.01, -0.01, 0.02, 0.2, -0.3, 0.3;
+    joint.table_from_model["m0"] = MovedAbout(Placing(), off, Eigen::Vector3d::Zero());
+  }
+  auto poses = SolveJoint(mesh, outcome.scene.photos, outcome.scene.masks, joint);
+  if (!poses) {
+    ADD_FAILURE() << ToString(poses.error());
+    return outcome;
+  }
+  outcome.poses = std::move(*poses);
+  for (std::size_t i = 0; i < outcome.poses.views.size(); ++i) {
+    const ViewPose& view = outcome.poses.views[i];
+    outcome.surface_px.push_back(
+        ScorePose(
+            mesh, {outcome.scene.truth[i], outcome.scene.true_intrinsics[i]},
+            {view.camera_from_model, outcome.poses.lens_states.at(view.lens_state).intrinsics})
+            .surface_rms_px);
+  }
+  return outcome;
+}
+
+Outcome SolveBug(const test::SceneFaults& faults, bool placing_known = true) {
+  static const TriangleMesh mesh = test::BugMesh(3);
+  test::SceneOptions options = RigOptions();
+  options.faults = faults;
+  return Solve(mesh, mesh, options, placing_known);
+}
+
+const Outcome& WithoutFault() {
+  static const Outcome outcome = SolveBug({});
+  return outcome;
+}
+
+// `figure` such as "-1.79" out of "stands -1.79° (".
+double NumberAfter(const std::string& text, const std::string& words) {
+  const auto at = text.find(words);
+  if (at == std::string::npos) return std::numeric_limits<double>::quiet_NaN();
+  return std::stod(text.substr(at + words.size()));
+}
+
+// The views that are not left out are posed as well as without the fault: within 1.1 of that, or
+// of a hundredth of a pixel where that is less.
+void ExpectNotSpread(const Outcome& outcome, const Outcome& whole,
+                     const std::vector<int>& left_out = {}) {
+  EXPECT_LT(outcome.RmsOf(left_out), 1.1 * std::max(0.015, whole.RmsOf(left_out)));
+  EXPECT_LT(outcome.WorstOf(left_out), 1.1 * std::max(0.03, whole.WorstOf(left_out)));
+  EXPECT_EQ(outcome.Rejected(), left_out);
+}
+
+bool Says(const std::string& text, const std::string& words) {
+  return text.find(words) != std::string::npos;
+}
+
+void Print(const Outcome& outcome, const std::vector<int>& left_out = {}) {
+  const Outcome& whole = WithoutFault();
+  std::cout << outcome.Notes();
+  for (const int i : outcome.Rejected())
+    std::cout << outcome.poses.views[static_cast<std::size_t>(i)].name
+              << " rejected: " << outcome.poses.views[static_cast<std::size_t>(i)].reason << "\n";
+  std::cout << "surface RMS " << outcome.RmsOf(left_out) << " px, worst view "
+            << outcome.WorstOf(left_out) << " px; without the fault " << whole.RmsOf(left_out)
+            << " and " << whole.WorstOf(left_out) << " px\n";
+}
+
+TEST(RigFaults, NothingIsFoundWhereNothingIsWrong) {
+  const Outcome& outcome = WithoutFault();
+  Print(outcome);
+  EXPECT_EQ(outcome.Notes(), "");
+  EXPECT_TRUE(outcome.Rejected().empty());
+}
+
+TEST(RigFaults, LostStepsFromViewNineOn) {
+  test::SceneFaults faults;
+  faults.steps_lost_from = 9;
+  faults.steps_lost_rad = RadFromDeg(1.8);
+  const Outcome outcome = SolveBug(faults);
+  Print(outcome);
+  ASSERT_EQ(outcome.poses.notes.size(), 1u);
+  EXPECT_TRUE(Says(outcome.Notes(), "From view v009 on the turntable"));
+  EXPECT_NEAR(NumberAfter(outcome.Notes(), "stands "), -1.8, 0.1);
+  ExpectNotSpread(outcome, WithoutFault());
+}
+
+TEST(RigFaults, TheSpecimenIsBumpedBetweenTwoViews) {
+  test::SceneFaults faults;
+  faults.moved_from = 12;
+  faults.moved << RadFromDeg(2) * Eigen::Vector3d(0.6, 0.64, 0.48), 0.3, -0.2, 0.1;
+  const Outcome outcome = SolveBug(faults);
+  Print(outcome);
+  ASSERT_EQ(outcome.poses.notes.size(), 1u);
+  EXPECT_TRUE(Says(outcome.Notes(), "Between views v011 and v012 the specimen moved"));
+  EXPECT_NEAR(NumberAfter(outcome.Notes(), "turned by "), 2.0, 0.1);
+  EXPECT_EQ(outcome.poses.views[11].mounting, "m0");
+  EXPECT_EQ(outcome.poses.views[12].mounting, "m0-from-v012");
+  ExpectNotSpread(outcome, WithoutFault());
+}
+
+TEST(RigFaults, OneViewAloneIsOff) {
+  test::SceneFaults faults;
+  faults.moved_from = 5;
+  faults.moved_until = 6;
+  faults.moved << RadFromDeg(2) * Eigen::Vector3d(0.6, 0.64, 0.48), 0.3, -0.2, 0.1;
+  const Outcome outcome = SolveBug(faults);
+  Print(outcome, {5});
+  EXPECT_EQ(outcome.Notes(), "");
+  EXPECT_TRUE(Says(outcome.poses.views[5].reason, "this view alone"));
+  EXPECT_NEAR(NumberAfter(outcome.poses.views[5].reason, "shows the specimen "), 2.0, 0.1);
+  ExpectNotSpread(outcome, WithoutFault(), {5});
+}
+
+TEST(RigFaults, ResumedWithAnotherZero) {
+  test::SceneFaults faults;
+  faults.resumed_at = 10;
+  faults.resumed_zero_rad = RadFromDeg(0.3);
+  const Outcome outcome = SolveBug(faults);
+  Print(outcome);
+  ASSERT_EQ(outcome.poses.notes.size(), 1u);
+  EXPECT_TRUE(Says(outcome.Notes(), "zero of reference epoch 2 differs from that of epoch 1"));
+  EXPECT_NEAR(NumberAfter(outcome.Notes(), "epoch 1 by "), 0.3, 0.07);
+  ExpectNotSpread(outcome, WithoutFault());
+}
+
+TEST(RigFaults, TheTurntablesSignIsInverted) {
+  test::SceneFaults faults;
+  faults.sign_inverted = true;
+  const Outcome outcome = SolveBug(faults, false);
+  Print(outcome);
+  ASSERT_EQ(outcome.poses.notes.size(), 1u);
+  EXPECT_TRUE(Says(outcome.Notes(), "runs the other way"));
+  ExpectNotSpread(outcome, WithoutFault());
+}
+
+TEST(RigFaults, TheSpecimenIsTurnedOver) {
+  test::SceneFaults faults;
+  faults.turned_over_at = 12;
+  faults.turned_over = TableFromModel(ExpSo3({3.0, 0.2, 0.4}), Eigen::Vector3d(-1, 2, 16));
+  const Outcome outcome = SolveBug(faults, false);
+  Print(outcome);
+  EXPECT_EQ(outcome.Notes(), "");
+  ASSERT_EQ(outcome.poses.mountings.size(), 2u);
+  EXPECT_EQ(outcome.poses.views[12].mounting, "m1");
+  ExpectNotSpread(outcome, WithoutFault());
+}
+
+}  // namespace
+}  // namespace scan
