@@ -17,6 +17,7 @@
 #include "firmware-host/cli/truth.h"
 #include "reconstruction/evaluate/fig12.h"
 #include "reconstruction/evaluate/pose_trial.h"
+#include "reconstruction/evaluate/turntable_trial.h"
 #include "reconstruction/masks/make_masks.h"
 #include "reconstruction/pipeline/pipeline.h"
 #include "reconstruction/specimens/specimen.h"
@@ -34,18 +35,25 @@ struct EvaluateOptions {
   std::string errors = "static";
   std::string method = "both";
   std::size_t views = 0;  // 0: the preset's
+  int width = 0;          // of the photographs; 0: the preset's
   bool full_size = false;
-  Fig12Options fig12;
+  Fig12Options fig12;  // its noise and seed are those of drawn masks, too
+  double focal_error_percent = 0, logged_sigma_deg = 0, logged_sigma_mm = 0;
   double wrong_px = 5;
   std::size_t paper_faces = 12000;
   bool per_view = false;
-  fs::path out;
+  fs::path out, from;
   bool force = false;
   EvaluateModelOptions model;
   PaperOptions paper;
   JointOptions joint;
 
   bool is_fig12() const { return preset == "fig12"; }
+  // 0: as captured.
+  int photo_width() const { return full_size ? 3696 : width > 0 || !is_fig12() ? width : 462; }
+  bool draws_masks() const {
+    return is_fig12() || photo_width() > 0 || fig12.noise.displaces() || fig12.noise.binary;
+  }
   bool with_joint() const { return method != "paper"; }
   bool with_paper() const { return method != "joint"; }
 };
@@ -138,12 +146,22 @@ Result<PoseTrial> TrialOf(const DemoPaths& paths, const EvaluateOptions& options
       EvenlySpread(trial.photos.photos.size(), options.views > 0 ? options.views : 24);
   trial.masks.resize(trial.photos.photos.size());
   trial = Subset(trial, indices);
-  SCAN_TRY(trial.masks, MakeMasks(trial.photos, {}, context.progress, context.stop));
+  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
+  trial.surface = ExactSurface(*specimen, 0.3);
+  TurntableErrors errors;
+  errors.w = options.photo_width();
+  errors.focal_error_rel = options.focal_error_percent / 100;
+  errors.turntable_sigma_rad = RadFromDeg(options.logged_sigma_deg);
+  errors.lift_sigma_mm = options.logged_sigma_mm;
+  StateErrors(trial, errors);
+  if (options.draws_masks()) {
+    DrawMasks(trial, {.noise = options.fig12.noise, .seed = options.fig12.seed});
+  } else {
+    SCAN_TRY(trial.masks, MakeMasks(trial.photos, {}, context.progress, context.stop));
+  }
   SCAN_TRY(const Volume volume, ReadVolume(paths.volume, {}));
   SCAN_TRY(SurfaceResult surface, ExtractSurface(volume, {}, context.progress, context.stop));
   trial.mesh = std::move(surface.mesh);
-  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
-  trial.surface = ExactSurface(*specimen, 0.3);
   return trial;
 }
 
@@ -179,21 +197,20 @@ Result<PoseTrial> CapturedTrial(const fs::path& folder, const EvaluateOptions& o
   return TrialOf(paths, options, context);
 }
 
-int WidthOf(const EvaluateOptions& options) { return options.full_size ? 3696 : options.fig12.w; }
-
 // The paper renders its photographs from the mesh that it then searches; so does this (but for
 // --paper-faces).
 Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
   SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
   Fig12Options fig12 = options.fig12;
   if (options.views > 0) fig12.cameras = static_cast<int>(options.views);
-  fig12.w = WidthOf(options);
+  fig12.w = options.photo_width();
   fig12.h = static_cast<int>(std::lround(fig12.w * 2448.0 / 3696));
   return MakeFig12Trial(ExactSurface(*specimen, 0.35), fig12);
 }
 
 Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& context) {
   if (options.is_fig12()) return Fig12Trial(options);
+  if (!options.from.empty()) return TrialOf(DemoPathsIn(options.from), options, context);
   if (options.out.empty()) {
     SCAN_TRY(const auto scratch, ScratchFolder::Create());
     return CapturedTrial(scratch->path(), options, context);
@@ -214,15 +231,20 @@ std::string WithinText(const MethodFigures& figures) {
 std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial) {
   const Intrinsics& in = trial.photos.intrinsics(trial.photos.photos.front());
   const std::string where =
-      options.is_fig12() ? fmt::format("Fig 12 protocol, f = {:g} mm", options.fig12.focal_mm)
-                         : fmt::format("simulated station, {} errors", options.errors);
+      options.is_fig12()     ? fmt::format("Fig 12 protocol, f = {:g} mm", options.fig12.focal_mm)
+      : options.from.empty() ? fmt::format("simulated station, {} errors", options.errors)
+                             : "simulated station, captured before";
   std::string text = fmt::format("{}: {} photographs of {} x {}, {}\n", options.specimen,
                                  trial.photos.photos.size(), in.w, in.h, where);
   const ContourNoise& noise = options.fig12.noise;
-  if (options.is_fig12() && (noise.displaces() || noise.binary))
+  if (noise.displaces() || noise.binary)
     text += fmt::format("outlines stray by {:g} px (correlation {:g} px), swell by {:g} px{}\n",
                         noise.sigma_px, noise.correlation_px, noise.bias_px,
                         noise.binary ? ", binary masks" : "");
+  if (!options.is_fig12() && options.draws_masks())
+    text += "masks drawn from the exact surface at the true cameras\n";
+  if (!options.is_fig12() && options.focal_error_percent != 0)
+    text += fmt::format("stated focal length off by {:g} %\n", options.focal_error_percent);
   if (options.with_paper())
     text += fmt::format(
         "paper: {} directions x {} distances x {} angles, {} chains x {} steps, gate {}, mesh of "
@@ -245,7 +267,8 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
     // The mesh is the truth: residuals hang together as far as the masks' errors do, and no more.
     constexpr double kLeastCorrelationPx = 2;
     if (options.fig12.noise.sigma_px > 0)
-      options.joint.refine.correlation_floor_px = kLeastCorrelationPx * 1848 / WidthOf(options);
+      options.joint.refine.correlation_floor_px =
+          kLeastCorrelationPx * 1848 / options.photo_width();
   }
   SCAN_TRY(const PoseTrial trial, MakeTrial(options, context));
   SCAN_TRY(const auto methods, RunMethods(trial, options, context));
@@ -259,10 +282,28 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
   return CommandOutput{{{"specimen", options.specimen},
                         {"preset", options.preset},
                         {"errors", options.is_fig12() ? Json() : Json(options.errors)},
+                        {"width", trial.photos.intrinsics(trial.photos.photos.front()).w},
                         {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
                         {"photographs", trial.photos.photos.size()},
                         {"methods", by_method}},
                        text};
+}
+
+// Of the simulated station: what is told to the solvers beside what is true.
+void AddStatedErrors(CLI::App& command, EvaluateOptions& options) {
+  command
+      .add_option("--focal-error-percent", options.focal_error_percent,
+                  "demo: the stated focal length is longer by this; its sigma grows by as much")
+      ->check(CLI::Range(-50.0, 50.0))
+      ->capture_default_str();
+  command
+      .add_option("--logged-sigma-deg", options.logged_sigma_deg,
+                  "demo: stated sigma of each turntable angle; as logged if not given")
+      ->check(CLI::Range(0.0, 180.0));
+  command
+      .add_option("--logged-sigma-mm", options.logged_sigma_mm,
+                  "demo: stated sigma of each lift height; as logged if not given")
+      ->check(CLI::Range(0.0, 100.0));
 }
 
 }  // namespace
@@ -297,24 +338,32 @@ void AddEvaluate(CommandSet& commands) {
   command.add_option("--focal-mm", options->fig12.focal_mm, "fig12: of a sensor 23.6 mm wide")
       ->check(CLI::Range(10.0, 1000.0))
       ->capture_default_str();
-  command.add_option("--width", options->fig12.w, "fig12: of the photographs, px")
-      ->check(CLI::Range(120, 8000))
-      ->capture_default_str();
-  command.add_flag("--full-size", options->full_size, "fig12: 3696 x 2448 instead of 462 x 306");
+  command
+      .add_option(
+          "--width", options->width,
+          "of the photographs, px; fig12: 462 if not given. Captured ones: masks drawn from "
+          "the exact surface at the true cameras take their place, as with every error of "
+          "the outlines")
+      ->check(CLI::Range(120, 8000));
+  command.add_flag("--full-size", options->full_size, "3696 x 2448")->excludes("--width");
   ContourNoise& noise = options->fig12.noise;
-  command.add_option("--noise-px", noise.sigma_px, "fig12: sigma by which the outlines stray")
+  command.add_option("--noise-px", noise.sigma_px, "sigma by which the outlines stray")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   command
       .add_option("--noise-length-px", noise.correlation_px,
-                  "fig12: integral of the noise's autocorrelation along the outline")
+                  "integral of the noise's autocorrelation along the outline")
       ->check(CLI::Range(0.5, 1000.0))
       ->capture_default_str();
-  command.add_option("--bias-px", noise.bias_px, "fig12: by which the masks swell")
+  command.add_option("--bias-px", noise.bias_px, "by which the masks swell")
       ->check(CLI::Range(-100.0, 100.0))
       ->capture_default_str();
-  command.add_flag("--binary", noise.binary, "fig12: masks of whole pixels");
-  command.add_option("--seed", options->fig12.seed, "fig12: of the cameras")->capture_default_str();
+  command.add_flag("--binary", noise.binary, "masks of whole pixels");
+  command
+      .add_option("--seed", options->fig12.seed,
+                  "of the outlines' errors; fig12: of the cameras, too")
+      ->capture_default_str();
+  AddStatedErrors(command, *options);
   command.add_option("--errors", options->errors, "of the simulated rig")
       ->check(CLI::IsMember({"ideal", "static", "dynamic"}))
       ->capture_default_str();
@@ -342,7 +391,12 @@ void AddEvaluate(CommandSet& commands) {
       ->check(CLI::Range(0, 100'000'000))
       ->capture_default_str();
   command.add_flag("--per-view", options->per_view, "one line a view");
-  command.add_option("--out", options->out, "keep session, truth and CT volume in this folder");
+  CLI::Option* out =
+      command.add_option("--out", options->out, "keep session, truth and CT volume in this folder");
+  command
+      .add_option("--from", options->from,
+                  "demo: a folder that --out made of this specimen, instead of a new capture")
+      ->excludes(out);
   command.add_flag("--force", options->force, "replace the folder");
 }
 

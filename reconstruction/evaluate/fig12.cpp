@@ -3,15 +3,11 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "drivers/base/rng.h"
 #include "drivers/base/units.h"
 #include "reconstruction/pose/paper/paper_camera.h"
-#include "reconstruction/render/rasterise.h"
 
 namespace scan {
 namespace {
@@ -37,50 +33,7 @@ Intrinsics CameraOf(const Fig12Options& options) {
   return in;
 }
 
-cv::Mat MaskOf(const TriangleMesh& mesh, const PoseOf& camera, const Fig12Options& options,
-               std::size_t view) {
-  const Intrinsics& in = camera.intrinsics;
-  cv::Mat coverage;
-  if (options.noise.displaces()) {
-    Rng rng(options.seed * 1000003 + view);
-    const auto outlines =
-        DisplacedContours(TrueOutlines(mesh, camera.camera_from_model, in), options.noise, rng);
-    coverage = CoverageOfContours(outlines, cv::Size(in.w, in.h));
-  } else {
-    coverage = RasteriseCoverage(mesh, camera.camera_from_model, in, options.samples);
-  }
-  if (options.noise.binary) cv::threshold(coverage, coverage, 127, 255, cv::THRESH_BINARY);
-  return coverage;
-}
-
 }  // namespace
-
-std::vector<Contour> TrueOutlines(const TriangleMesh& mesh,
-                                  const CameraFromModel& camera_from_model, const Intrinsics& in) {
-  constexpr int kFineWidth = 7392, kMargin = 4, kSamples = 4, kLongestSide = 16384;
-  Eigen::AlignedBox2d box;
-  for (const Eigen::Vector3d& v : mesh.vertices)
-    if (const auto pixel = Project(in, camera_from_model * v)) box.extend(*pixel);
-  if (box.isEmpty()) return {};
-  const Eigen::Array2i low = box.min().array().floor().cast<int>() - kMargin;
-  const Eigen::Array2i high = box.max().array().ceil().cast<int>() + kMargin;
-  const Eigen::Array2i size = high - low;
-  const int fine = std::clamp(kFineWidth / in.w, 1, std::max(1, kLongestSide / size.maxCoeff()));
-  Intrinsics cut = in;
-  cut.cx = fine * (in.cx - low.x());
-  cut.cy = fine * (in.cy - low.y());
-  cut.fl_x *= fine;
-  cut.fl_y *= fine;
-  cut.w = fine * size.x();
-  cut.h = fine * size.y();
-  Mask mask;
-  mask.coverage = RasteriseCoverage(mesh, camera_from_model, cut, kSamples);
-  std::vector<Contour> contours = ExtractContours(mask);
-  for (Contour& contour : contours)
-    for (ContourPoint& p : contour.points)
-      p.position = p.position / fine + low.matrix().cast<double>();
-  return contours;
-}
 
 PoseTrial MakeFig12Trial(const TriangleMesh& mesh, const Fig12Options& options) {
   PoseTrial trial;
@@ -106,8 +59,8 @@ PoseTrial MakeFig12Trial(const TriangleMesh& mesh, const Fig12Options& options) 
   }
   trial.masks.resize(trial.truth.size());
   tbb::parallel_for(std::size_t{0}, trial.masks.size(), [&](std::size_t i) {
-    trial.masks[i].coverage = MaskOf(mesh, trial.truth[i], options, i);
-    trial.masks[i].binary = options.noise.binary;
+    trial.masks[i] =
+        DrawMask(mesh, trial.truth[i], {options.noise, options.samples, options.seed}, i);
   });
   return trial;
 }

@@ -3,11 +3,10 @@
 
 #include <cstdint>
 #include <stop_token>
-#include <vector>
 
 #include "drivers/base/progress.h"
 #include "drivers/base/result.h"
-#include "reconstruction/evaluate/contour_noise.h"
+#include "reconstruction/evaluate/drawn_mask.h"
 #include "reconstruction/evaluate/pose_trial.h"
 
 namespace scan {
@@ -23,12 +22,6 @@ struct Fig12Options {
   std::uint64_t seed = 12;
   ContourNoise noise;  // of each photograph's mask, independent between them
 };
-
-// The true outlines in pixels of `intrinsics`, to a few hundredths of one: the contours of a finer
-// picture. Precondition: all of the mesh in front of the camera. Thread contract: pure.
-std::vector<Contour> TrueOutlines(const TriangleMesh& mesh,
-                                  const CameraFromModel& camera_from_model,
-                                  const Intrinsics& intrinsics);
 
 // Photographs of `mesh` (model frame, mm) as masks of area coverage, with the stated errors of
 // their outlines; without any logged pose, all with the stated focal length and r0. Same bytes for
