@@ -10,6 +10,7 @@
 
 #include "drivers/base/staged_folder.h"
 #include "drivers/base/units.h"
+#include "drivers/station/station_file.h"
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/cli/demo_capture.h"
 #include "firmware-host/cli/evaluate_model.h"
@@ -49,6 +50,7 @@ struct EvaluateOptions {
   JointOptions joint;
 
   bool is_fig12() const { return preset == "fig12"; }
+  bool was_captured() const { return !is_fig12() && !from.empty(); }
   // 0: as captured.
   int photo_width() const { return full_size ? 3696 : width > 0 || !is_fig12() ? width : 462; }
   bool draws_masks() const {
@@ -210,7 +212,7 @@ Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
 
 Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& context) {
   if (options.is_fig12()) return Fig12Trial(options);
-  if (!options.from.empty()) return TrialOf(DemoPathsIn(options.from), options, context);
+  if (options.was_captured()) return TrialOf(DemoPathsIn(options.from), options, context);
   if (options.out.empty()) {
     SCAN_TRY(const auto scratch, ScratchFolder::Create());
     return CapturedTrial(scratch->path(), options, context);
@@ -270,6 +272,10 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
       options.joint.refine.correlation_floor_px =
           kLeastCorrelationPx * 1848 / options.photo_width();
   }
+  if (options.was_captured()) {
+    SCAN_TRY(const StationConfig station, LoadStationConfig(DemoPathsIn(options.from).config));
+    options.specimen = station.sim.specimen;
+  }
   SCAN_TRY(const PoseTrial trial, MakeTrial(options, context));
   SCAN_TRY(const auto methods, RunMethods(trial, options, context));
   Json by_method = Json::object();
@@ -279,14 +285,15 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
   text += TableOf(methods, options.wrong_px, options.per_view);
   if (options.is_fig12())
     for (const MethodFigures& method : methods) text += WithinText(method);
-  return CommandOutput{{{"specimen", options.specimen},
-                        {"preset", options.preset},
-                        {"errors", options.is_fig12() ? Json() : Json(options.errors)},
-                        {"width", trial.photos.intrinsics(trial.photos.photos.front()).w},
-                        {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
-                        {"photographs", trial.photos.photos.size()},
-                        {"methods", by_method}},
-                       text};
+  return CommandOutput{
+      {{"specimen", options.specimen},
+       {"preset", options.preset},
+       {"errors", options.is_fig12() || options.was_captured() ? Json() : Json(options.errors)},
+       {"width", trial.photos.intrinsics(trial.photos.photos.front()).w},
+       {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
+       {"photographs", trial.photos.photos.size()},
+       {"methods", by_method}},
+      text};
 }
 
 // Of the simulated station: what is told to the solvers beside what is true.
@@ -395,7 +402,7 @@ void AddEvaluate(CommandSet& commands) {
       command.add_option("--out", options->out, "keep session, truth and CT volume in this folder");
   command
       .add_option("--from", options->from,
-                  "demo: a folder that --out made of this specimen, instead of a new capture")
+                  "demo: a folder that --out made, with its specimen, instead of a new capture")
       ->excludes(out);
   command.add_flag("--force", options->force, "replace the folder");
 }
