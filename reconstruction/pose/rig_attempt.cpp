@@ -12,17 +12,21 @@ namespace {
 
 // Changes in turn uncover each other: what is left after the first solve is looked at again.
 constexpr int kRounds = 2;
+constexpr double kExplainedPx = 3;  // mean distance of outlines, in a picture 1848 px wide
+
+double UnitOf(const RefineOptions& refine) { return refine.last_window_px / 8; }
 
 bool AnyLogged(const RigModel& rig) {
   return std::any_of(rig.views().begin(), rig.views().end(),
                      [](const RigView& view) { return view.logged; });
 }
 
-double MeanDistance(const AttemptInput& in, const RigModel& rig, const RigParameters& parameters) {
+double MeanDistance(const AttemptInput& in, const std::vector<bool>& use, const RigModel& rig,
+                    const RigParameters& parameters) {
   const double clip_px = 1.5 * in.refine.last_window_px;
   std::vector<double> distance(in.photos.size(), 0);
   tbb::parallel_for(std::size_t{0}, in.photos.size(), [&](std::size_t i) {
-    if (!in.use[i]) return;
+    if (!use[i]) return;
     const ViewState state{rig.CameraFromModelOf(parameters, static_cast<int>(i)),
                           rig.IntrinsicsOf(parameters, rig.views()[i].lens),
                           parameters.mask_bias_px};
@@ -31,9 +35,19 @@ double MeanDistance(const AttemptInput& in, const RigModel& rig, const RigParame
   double sum = 0, count = 0;
   for (std::size_t i = 0; i < distance.size(); ++i) {
     sum += distance[i];
-    count += in.use[i] ? 1 : 0;
+    count += use[i] ? 1 : 0;
   }
   return sum / std::max(1.0, count);
+}
+
+// Changes are of a rig that shows this specimen: they leave most views in, and those explained.
+// Else (another specimen, another scale or focal length) any rig could be bent to some outlines.
+bool AreOfTheRig(const AttemptInput& in, const RigAttempt& attempt) {
+  const auto views = std::count(in.use.begin(), in.use.end(), true);
+  const auto left = std::count(attempt.use.begin(), attempt.use.end(), true);
+  return 4 * left >= 3 * views &&
+         MeanDistance(in, attempt.use, attempt.rig, attempt.fit.parameters) <
+             kExplainedPx * UnitOf(in.refine);
 }
 
 Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std::stop_token stop) {
@@ -41,6 +55,7 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
   RigModel& rig = attempt.rig;
   SCAN_CHECK(ChooseStarts(in.mesh, rig, in.photos, in.use, in.known, in.search, in.refine, stop));
   attempt.fit = RefineJoint(in.mesh, rig, in.photos, in.use, rig.Nominal(), in.refine, stop);
+  const RigAttempt plain = attempt;
   for (int round = 0; round < kRounds && AnyLogged(rig) && !stop.stop_requested(); ++round) {
     RigParameters parameters = attempt.fit.parameters;
     const auto found = FindChanges(in.mesh, rig, in.photos, attempt.use, in.refine,
@@ -55,7 +70,8 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
     attempt.fit = RefineJoint(in.mesh, rig, in.photos, attempt.use, parameters, again, stop);
   }
   if (stop.stop_requested()) return Cancelled("pose");
-  attempt.distance_px = MeanDistance(in, rig, attempt.fit.parameters);
+  if (!attempt.changes.empty() && !AreOfTheRig(in, attempt)) attempt = plain;
+  attempt.distance_px = MeanDistance(in, in.use, attempt.rig, attempt.fit.parameters);
   return attempt;
 }
 
@@ -65,11 +81,11 @@ Result<RigAttempt> SolveWithChanges(const AttemptInput& input, const RigModel& r
                                     std::stop_token stop) {
   constexpr std::size_t kManyChanges = 3;
   SCAN_TRY(RigAttempt as_logged, Attempt(input, rig, stop));
-  const double unit = input.refine.last_window_px / 8;  // 1 at 1848 px
+  const double unit = UnitOf(input.refine);
   const bool turns = std::any_of(rig.views().begin(), rig.views().end(),
                                  [](const RigView& view) { return view.turns; });
   const bool explained =
-      as_logged.distance_px < 3 * unit && as_logged.changes.size() < kManyChanges;
+      as_logged.distance_px < kExplainedPx * unit && as_logged.changes.size() < kManyChanges;
   if (!turns || explained) return as_logged;
   RigModel other = rig;
   other.ReverseTurntable();
