@@ -9,6 +9,7 @@
 #include "drivers/base/frames.h"
 #include "drivers/base/intrinsics.h"
 #include "reconstruction/mesh/mesh.h"
+#include "reconstruction/pose/contour_clusters.h"
 #include "reconstruction/render/contour_generators.h"
 
 namespace scan {
@@ -20,6 +21,7 @@ struct ContourMesh {
 
   const TriangleMesh& mesh;  // outlives this
   MeshEdges edges;
+  ContourClusters clusters;
   // Faces run through every edge as often one way as the other: every line of sight enters as
   // often as it leaves. Stays so when vertices are merged.
   bool closed = false;
