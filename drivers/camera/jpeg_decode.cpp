@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/camera/encode_picture.h"
+#include "drivers/camera/stated_size.h"
 
 namespace scan {
 namespace {
@@ -33,7 +34,7 @@ void OnMessage(j_common_ptr info, int level) {
 }
 
 struct JpegHead {
-  int w = 0, h = 0;
+  std::uint32_t w = 0, h = 0;
   bool has_huffman_tables = false;
 };
 
@@ -65,8 +66,8 @@ bool Decode(JpegDecoder& decoder, std::span<const std::byte> bytes, const Work& 
 
 bool ReadHead(JpegDecoder& decoder, std::span<const std::byte> bytes, JpegHead* head) {
   return Decode(decoder, bytes, [head](const jpeg_decompress_struct& info) {
-    head->w = static_cast<int>(info.image_width);
-    head->h = static_cast<int>(info.image_height);
+    head->w = info.image_width;
+    head->h = info.image_height;
     head->has_huffman_tables = info.dc_huff_tbl_ptrs[0] != nullptr;
   });
 }
@@ -95,8 +96,7 @@ Result<JpegHead> HeadOf(std::span<const std::byte> bytes) {
   JpegHead head;
   if (bytes.size() < 4) return Corrupt("it is empty");
   if (!ReadHead(decoder, bytes, &head)) return Corrupt(decoder.error.text);
-  if (head.w < 1 || head.h < 1 || head.w > 32768 || head.h > 32768)
-    return Corrupt("its size is absurd");
+  if (!IsPictureSize(head.w, head.h)) return Corrupt("its size is absurd");
   return head;
 }
 
@@ -122,18 +122,19 @@ Result<std::vector<std::byte>> StandardHuffmanTables() {
 
 Result<cv::Mat> DecodeJpegStrictly(std::span<const std::byte> bytes, std::size_t* used) {
   SCAN_TRY(const JpegHead head, HeadOf(bytes));
-  cv::Mat picture(head.h, head.w, CV_8UC3);
+  auto picture = PictureOfStatedSize(head.w, head.h, CV_8UC3);
+  if (!picture) return Corrupt(picture.error());
   JpegDecoder decoder{};
   std::size_t length = 0;
-  if (!ReadPixels(decoder, bytes, picture.data, picture.step, &length))
+  if (!ReadPixels(decoder, bytes, picture->data, picture->step, &length))
     return Corrupt(decoder.error.text);
   if (used) *used = length;
-  return picture;
+  return *picture;
 }
 
 Result<EncodedFile> JpegFileOf(std::span<const std::byte> bytes, int w, int h) {
   SCAN_TRY(const JpegHead head, HeadOf(bytes));
-  if (head.w != w || head.h != h)
+  if (std::int64_t{head.w} != w || std::int64_t{head.h} != h)
     return Corrupt("it is " + std::to_string(head.w) + " x " + std::to_string(head.h) + ", not " +
                    std::to_string(w) + " x " + std::to_string(h));
   std::size_t length = 0;

@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <string>
 
+#include "drivers/camera/stated_size.h"
+
 namespace scan {
 namespace {
-
-constexpr int kMostPixelsASide = 32768;
 
 // What stands between setjmp and longjmp has no destructor: libpng leaves by jumping.
 struct PngEncoder {
@@ -86,18 +86,18 @@ Result<cv::Mat> DecodePngFile(std::span<const std::byte> bytes) {
   image.version = PNG_IMAGE_VERSION;
   if (!png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()))
     return bad(image.message);
-  if (image.width > kMostPixelsASide || image.height > kMostPixelsASide) {
+  auto picture = PictureOfStatedSize(image.width, image.height, CV_8UC3);
+  if (!picture) {
     png_image_free(&image);
-    return bad("its size is absurd");
+    return bad(picture.error());
   }
   image.format = PNG_FORMAT_BGR;
   image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
-  cv::Mat picture(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3);
   const png_color black{};  // behind transparent pixels
-  if (!png_image_finish_read(&image, &black, picture.data, static_cast<png_int_32>(picture.step),
+  if (!png_image_finish_read(&image, &black, picture->data, static_cast<png_int_32>(picture->step),
                              nullptr))
     return bad(image.message);
-  return picture;
+  return *picture;
 }
 
 }  // namespace scan

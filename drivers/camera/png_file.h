@@ -15,7 +15,8 @@ namespace scan {
 // Errors: failed when the encoder fails. Thread contract: pure.
 Result<std::vector<std::byte>> EncodePngFile(const cv::Mat& bgr);
 
-// All of it, as CV_8UC3, BGR; of 16 bits the upper 8 are kept, transparency is dropped.
+// All of it, as CV_8UC3, BGR; of 16 bits the upper 8 are kept; behind what is transparent lies
+// black.
 // Errors: bad_input, with what is wrong. Thread contract: pure.
 Result<cv::Mat> DecodePngFile(std::span<const std::byte> bytes);
 

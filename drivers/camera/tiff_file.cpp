@@ -11,10 +11,10 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "drivers/camera/stated_size.h"
+
 namespace scan {
 namespace {
-
-constexpr int kLongestSide = 32768;
 
 int OnTiffError(TIFF*, void* text, const char*, const char* format, va_list arguments) {
   char line[160];
@@ -67,15 +67,18 @@ Result<cv::Mat> DecodeTiffFile(std::span<const std::byte> bytes) {
   std::uint32_t w = 0, h = 0;
   TIFFGetField(file.get(), TIFFTAG_IMAGEWIDTH, &w);
   TIFFGetField(file.get(), TIFFTAG_IMAGELENGTH, &h);
-  if (w < 1 || h < 1 || w > kLongestSide || h > kLongestSide) return bad("its size is absurd");
-  cv::Mat rgba(static_cast<int>(h), static_cast<int>(w), CV_8UC4);  // in words, low byte red
-  if (!TIFFReadRGBAImageOriented(file.get(), w, h, rgba.ptr<std::uint32_t>(), ORIENTATION_TOPLEFT,
+  auto rgba = PictureOfStatedSize(w, h, CV_8UC4);  // in words, low byte red
+  if (!rgba) return bad(rgba.error());
+  auto bgr = PictureOfStatedSize(w, h, CV_8UC3);
+  if (!bgr) return bad(bgr.error());
+  // In stored order, whatever the file says of its orientation.
+  TIFFSetField(file.get(), TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
+  if (!TIFFReadRGBAImageOriented(file.get(), w, h, rgba->ptr<std::uint32_t>(), ORIENTATION_TOPLEFT,
                                  1))
     return bad("its pixels do not decode");
   static_assert(std::endian::native == std::endian::little);
-  cv::Mat bgr;
-  cv::cvtColor(rgba, bgr, cv::COLOR_RGBA2BGR);
-  return bgr;
+  cv::cvtColor(*rgba, *bgr, cv::COLOR_RGBA2BGR);
+  return *bgr;
 }
 
 }  // namespace scan

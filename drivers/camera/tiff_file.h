@@ -9,7 +9,8 @@
 
 namespace scan {
 
-// The first picture, all of it, as CV_8UC3, BGR; of 16 bits the upper 8 are kept.
+// The first picture, all of it, as CV_8UC3, BGR, in stored order; of 16 bits the upper 8 are
+// kept.
 // Errors: bad_input, with what is wrong; failed without memory for it. Thread contract: pure.
 Result<cv::Mat> DecodeTiffFile(std::span<const std::byte> bytes);
 

@@ -57,6 +57,43 @@ TEST(DecodePicture, SixteenBitsBecomeEight) {
   }
 }
 
+// Makes an entry of the first directory another (TIFF 6.0, section 2).
+void ReplaceTiffTag(std::vector<std::byte>& tiff, unsigned tag, unsigned by, unsigned value) {
+  const auto at = [&](std::size_t i) { return std::to_integer<std::size_t>(tiff.at(i)); };
+  const auto put = [&](std::size_t i, unsigned number) {
+    tiff.at(i) = static_cast<std::byte>(number & 0xff);
+    tiff.at(i + 1) = static_cast<std::byte>(number >> 8);
+  };
+  const std::size_t directory = at(4) | at(5) << 8 | at(6) << 16 | at(7) << 24;
+  const std::size_t entries = at(directory) | at(directory + 1) << 8;
+  for (std::size_t entry = directory + 2; entry < directory + 2 + 12 * entries; entry += 12) {
+    if ((at(entry) | at(entry + 1) << 8) != tag) continue;
+    put(entry, by);
+    put(entry + 8, value);
+    return;
+  }
+  ADD_FAILURE() << "no tag " << tag;
+}
+
+TEST(DecodePicture, TheOrientationThatATiffStatesTurnsNothing) {
+  constexpr unsigned kPlanarConfiguration = 284, kOrientation = 274, kBottomRight = 3;
+  const cv::Mat colour = Noise(CV_8UC3);
+  auto tiff = ByOpenCv("tif", colour);
+  ReplaceTiffTag(tiff, kPlanarConfiguration, kOrientation, kBottomRight);
+  const auto picture = DecodePicture("tif", tiff);
+  ASSERT_TRUE(picture) << ToString(picture.error());
+  EXPECT_EQ(cv::norm(*picture, colour, cv::NORM_INF), 0);
+}
+
+TEST(DecodePicture, AnAbsurdSizeIsAnError) {
+  constexpr unsigned kWidth = 256;
+  for (const unsigned claimed : {0U, 32769U, 65535U}) {
+    auto tiff = ByOpenCv("tif", Noise(CV_8UC3));
+    ReplaceTiffTag(tiff, kWidth, kWidth, claimed);
+    EXPECT_FALSE(DecodePicture("tif", tiff)) << claimed;
+  }
+}
+
 TEST(EncodePicture, PngIsWithoutLossInEightAndSixteenBits) {
   for (const int type : {CV_8UC3, CV_16UC3}) {
     const cv::Mat whole = Noise(type);
