@@ -19,8 +19,10 @@ void AddAllCommands(CommandSet& commands) {
   AddUsbDevices(commands, device);
   AddTmcDevices(commands, device);
   AddDoctor(commands);
-#ifdef SCAN_RECONSTRUCTION
+#ifdef SCAN_IMPORT
   AddImport(commands);
+#endif
+#ifdef SCAN_RECONSTRUCTION
   AddSurface(commands);
   AddAtlas(commands);
   AddMasks(commands);
