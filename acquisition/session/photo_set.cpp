@@ -70,6 +70,7 @@ class Assembler {
     photo.aim = aim;
     photo.mounting_id = view.mounting_id;
     photo.reference_epoch = frame.reference_epoch;
+    photo.capture_seq = session_.state.FrameSeq(view.id, 0);
     if (frame.axes.turntable_deg)
       photo.turntable_rad = ToPrior(*frame.axes.turntable_deg, RadFromDeg(1));
     if (frame.axes.lift_mm) photo.lift_mm = ToPrior(*frame.axes.lift_mm, 1);

@@ -1,6 +1,7 @@
 // The photographs of a session as evidence: what the reconstruction reads.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -44,9 +45,9 @@ struct AxisPrior {
 };
 
 struct Photo {
-  std::string id;              // [a-z0-9-]+
-  std::string name;            // base name without extension
-  std::filesystem::path path;  // absolute
+  std::string id;                     // [a-z0-9-]+
+  std::string name;                   // base name without extension
+  std::filesystem::path path;         // absolute
   std::filesystem::path mask_path;    // absolute; empty when no mask exists
   std::filesystem::path ignore_path;  // absolute; empty when there is none
   int aim = 0;                        // index into PhotoSet::aims
@@ -55,7 +56,8 @@ struct Photo {
   std::optional<CameraFromTable> camera_from_table;  // nominal; empty: no logged pose
   std::optional<AxisPrior> turntable_rad;
   std::optional<AxisPrior> lift_mm;
-  RigidSigma sigma_view;  // further independent error of this frame's camera
+  RigidSigma sigma_view;         // further independent error of this frame's camera
+  std::int64_t capture_seq = 0;  // rises in the order of capture; alike where that is unknown
 };
 
 struct PhotoSet {

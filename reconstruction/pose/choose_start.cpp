@@ -65,7 +65,7 @@ Result<std::vector<ChosenStart>> ChooseStarts(const ContourMesh& mesh, RigModel&
                                               const RefineOptions& refine, std::stop_token stop) {
   const TriangleMesh coarse_triangles = MeshForRoughSteps(mesh);
   const ContourMesh coarse(coarse_triangles);
-  const double unit = refine.last_window_px / 8;  // 1 at 1848 px
+  const double unit = UnitPx(refine);
   std::vector<ChosenStart> chosen(rig.mounting_ids().size());
   for (std::size_t m = 0; m < chosen.size(); ++m) {
     const int mounting = static_cast<int>(m);

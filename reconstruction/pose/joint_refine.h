@@ -27,6 +27,10 @@ struct RefineOptions {
   double converged_px = 0.01;  // largest motion of any view's surface in the last step
 };
 
+// 1 px of a picture 1848 px wide, in those of the pictures that `options` are scaled to; not less
+// than a half.
+inline double UnitPx(const RefineOptions& options) { return options.last_window_px / 8; }
+
 struct ViewFit {
   MatchResult match;
   double sigma_px = 0;  // robust scale of the residuals, floored

@@ -14,8 +14,6 @@ namespace {
 constexpr int kRounds = 2;
 constexpr double kExplainedPx = 3;  // mean distance of outlines, in a picture 1848 px wide
 
-double UnitOf(const RefineOptions& refine) { return refine.last_window_px / 8; }
-
 bool AnyLogged(const RigModel& rig) {
   return std::any_of(rig.views().begin(), rig.views().end(),
                      [](const RigView& view) { return view.logged; });
@@ -47,7 +45,7 @@ bool AreOfTheRig(const AttemptInput& in, const RigAttempt& attempt) {
   const auto left = std::count(attempt.use.begin(), attempt.use.end(), true);
   return 4 * left >= 3 * views &&
          MeanDistance(in, attempt.use, attempt.rig, attempt.fit.parameters) <
-             kExplainedPx * UnitOf(in.refine);
+             kExplainedPx * UnitPx(in.refine);
 }
 
 Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std::stop_token stop) {
@@ -81,7 +79,7 @@ Result<RigAttempt> SolveWithChanges(const AttemptInput& input, const RigModel& r
                                     std::stop_token stop) {
   constexpr std::size_t kManyChanges = 3;
   SCAN_TRY(RigAttempt as_logged, Attempt(input, rig, stop));
-  const double unit = UnitOf(input.refine);
+  const double unit = UnitPx(input.refine);
   const bool turns = std::any_of(rig.views().begin(), rig.views().end(),
                                  [](const RigView& view) { return view.turns; });
   const bool explained =

@@ -107,15 +107,16 @@ Vector6d RigidSigmas() {
   return sigma;
 }
 
-// The views used from `view` on that `same` says belong together with it; empty when fewer than two
-// stand on either side: such a change is that of one view.
+// The views used, taken since `view`, that `same` says belong together with it; empty when fewer
+// than two stand on either side: such a change is that of one view.
 template <class Same>
-std::vector<int> FromThereOn(const std::vector<ViewTerms>& terms, int view, Same&& same) {
+std::vector<int> TakenSince(const RigModel& rig, const std::vector<ViewTerms>& terms, int view,
+                            Same&& same) {
   std::vector<int> after;
   int before = 0;
   for (int i = 0; i < static_cast<int>(terms.size()); ++i) {
     if (!terms[static_cast<std::size_t>(i)].used || !same(i)) continue;
-    if (i < view) {
+    if (rig.views()[i].taken < rig.views()[view].taken) {
       ++before;
     } else {
       after.push_back(i);
@@ -159,24 +160,23 @@ std::optional<RigChange> MostLikelyChange(const RigModel& rig, const RigEvidence
     if (!terms[static_cast<std::size_t>(i)].used) continue;
     ++used;
     const RigView& view = rig.views()[i];
-    alone = Better(alone,
-                   {RigChange::Kind::view_alone, i, 0, 0, test.Gain({i}, 6, [&](const ViewTerms&) {
-                      ChangeColumns D = ChangeColumns::Zero(kEvidenceSize, 6);
-                      D.topRows<6>() = sigma.asDiagonal();
-                      return D;
-                    })});
-    const auto turned = FromThereOn(terms, i, [&](int k) {
+    alone = Better(alone, {RigChange::Kind::view_alone, i, test.Gain({i}, 6, [&](const ViewTerms&) {
+                             ChangeColumns D = ChangeColumns::Zero(kEvidenceSize, 6);
+                             D.topRows<6>() = sigma.asDiagonal();
+                             return D;
+                           })});
+    const auto turned = TakenSince(rig, terms, i, [&](int k) {
       return rig.views()[k].turns && rig.views()[k].epoch == view.epoch;
     });
     if (view.turns && !turned.empty())
-      steps = Better(steps, {RigChange::Kind::steps_lost, i, 0, 0,
+      steps = Better(steps, {RigChange::Kind::steps_lost, i,
                              test.Gain(turned, 1, [&](const ViewTerms& t) -> ChangeColumns {
                                return t.by_angle * options.steps_sigma_rad;
                              })});
     const auto placed =
-        FromThereOn(terms, i, [&](int k) { return rig.views()[k].mounting == view.mounting; });
+        TakenSince(rig, terms, i, [&](int k) { return rig.views()[k].mounting == view.mounting; });
     if (!placed.empty())
-      moved = Better(moved, {RigChange::Kind::specimen_moved, i, 0, 0,
+      moved = Better(moved, {RigChange::Kind::specimen_moved, i,
                              test.Gain(placed, 6, [&](const ViewTerms& t) -> ChangeColumns {
                                return t.by_placing * sigma.asDiagonal();
                              })});
@@ -211,14 +211,11 @@ std::vector<RigChange> FindChanges(const ContourMesh& mesh, RigModel& rig,
     const std::string from = "-from-" + names[static_cast<std::size_t>(change->view)];
     switch (change->kind) {
       case RigChange::Kind::steps_lost:
-        change->before = view.epoch;
-        change->after = rig.SplitEpoch(change->view, rig.epoch_names()[view.epoch] + from,
-                                       options.steps_sigma_rad, parameters);
+        rig.SplitEpoch(change->view, rig.epoch_names()[view.epoch] + from, options.steps_sigma_rad,
+                       parameters);
         break;
       case RigChange::Kind::specimen_moved:
-        change->before = view.mounting;
-        change->after =
-            rig.SplitMounting(change->view, rig.mounting_ids()[view.mounting] + from, parameters);
+        rig.SplitMounting(change->view, rig.mounting_ids()[view.mounting] + from, parameters);
         break;
       case RigChange::Kind::view_alone:
         evidence[static_cast<std::size_t>(change->view)].reset();

@@ -5,7 +5,6 @@
 
 #include <optional>
 #include <span>
-#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -15,14 +14,13 @@ namespace scan {
 
 struct RigChange {
   enum class Kind {
-    steps_lost,      // from `view` on the turntable's angle is off by a constant
-    specimen_moved,  // from `view` on the specimen stands elsewhere on the table
+    steps_lost,      // since `view` the turntable's angle is off by a constant
+    specimen_moved,  // since `view` the specimen stands elsewhere on the table
     view_alone,      // only this view disagrees with the log and with the others
   };
   Kind kind = Kind::view_alone;
-  int view = 0;
-  int before = 0, after = 0;  // epochs or mountings of the rig, after it was split
-  double gain = 0;            // of the log-likelihood
+  int view = 0;     // the first taken after it
+  double gain = 0;  // of the log-likelihood
 };
 
 struct ChangeOptions {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/pose/rig_chain.h"
@@ -57,6 +58,13 @@ RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(pr
     views_.push_back(view);
   }
   start_.resize(mounting_ids_.size());
+  std::vector<std::size_t> order(views_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return photos.photos[a].capture_seq < photos.photos[b].capture_seq;
+  });
+  for (std::size_t rank = 0; rank < order.size(); ++rank)
+    views_[order[rank]].taken = static_cast<int>(rank);
 }
 
 void RigModel::set_view_start(int view, const CameraFromModel& camera_from_model,
@@ -70,28 +78,28 @@ void RigModel::set_view_start(int view, const CameraFromModel& camera_from_model
                      camera_from_model.translation() - v.camera_from_station.translation());
 }
 
-int RigModel::SplitEpoch(int first_view, const std::string& name, double sigma_rad,
-                         RigParameters& parameters) {
+void RigModel::SplitEpoch(int first_view, const std::string& name, double sigma_rad,
+                          RigParameters& parameters) {
   const int before = views_[static_cast<std::size_t>(first_view)].epoch;
   const int after = static_cast<int>(epoch_names_.size());
   epoch_names_.push_back(name);
   epoch_sigma_rad_.push_back(sigma_rad);
   parameters.epochs.push_back(parameters.epochs[static_cast<std::size_t>(before)]);
-  for (auto i = static_cast<std::size_t>(first_view); i < views_.size(); ++i)
-    if (views_[i].epoch == before) views_[i].epoch = after;
-  return after;
+  const int since = views_[static_cast<std::size_t>(first_view)].taken;
+  for (RigView& view : views_)
+    if (view.epoch == before && view.taken >= since) view.epoch = after;
 }
 
-int RigModel::SplitMounting(int first_view, const std::string& id, RigParameters& parameters) {
+void RigModel::SplitMounting(int first_view, const std::string& id, RigParameters& parameters) {
   const int before = views_[static_cast<std::size_t>(first_view)].mounting;
   const int after = static_cast<int>(mounting_ids_.size());
   mounting_ids_.push_back(id);
   start_.push_back(TableFromModel(start_[static_cast<std::size_t>(before)]));
   const std::array<double, 6> placing = parameters.mountings[static_cast<std::size_t>(before)];
   parameters.mountings.push_back(placing);
-  for (auto i = static_cast<std::size_t>(first_view); i < views_.size(); ++i)
-    if (views_[i].mounting == before) views_[i].mounting = after;
-  return after;
+  const int since = views_[static_cast<std::size_t>(first_view)].taken;
+  for (RigView& view : views_)
+    if (view.mounting == before && view.taken >= since) view.mounting = after;
 }
 
 void RigModel::ReverseTurntable() {

@@ -57,6 +57,7 @@ struct RigParameters {
 // What a view takes from the shared unknowns.
 struct RigView {
   int mounting = 0, epoch = 0, aim = 0, lens = 0;
+  int taken = 0;        // rank in the order of capture, as far as it is known
   bool logged = false;  // a nominal pose exists; else the view is a mounting of its own
   bool placed = false;  // set_view_start was called
   bool turns = false;   // a logged turntable angle exists
@@ -79,7 +80,7 @@ class RigModel {
   void set_ct_scale_sigma(double relative) { priors_.ct_scale_rel = relative; }
   std::span<const RigView> views() const { return views_; }
   const std::vector<std::string>& mounting_ids() const { return mounting_ids_; }
-  // "1" for the session's reference epoch 1; "1_from_v009" for what was split off from it.
+  // "1" for the session's reference epoch 1; "1-from-v009" for what was split off from it.
   const std::vector<std::string>& epoch_names() const { return epoch_names_; }
   // A mounting that is one view without a nominal pose.
   static bool IsViewMounting(const std::string& id) { return id.starts_with(' '); }
@@ -101,12 +102,12 @@ class RigModel {
   bool held(int lens, int parameter) const { return held_[lens][parameter]; }
   void set_held(int lens, int parameter, bool held) { held_[lens][parameter] = held; }
 
-  // From `first_view` on the views of its epoch get a turntable offset of their own, those of its
-  // mounting a placing of their own; `parameters` grows by it, equal to what it was split from.
-  // Return the new index.
-  int SplitEpoch(int first_view, const std::string& name, double sigma_rad,
-                 RigParameters& parameters);
-  int SplitMounting(int first_view, const std::string& id, RigParameters& parameters);
+  // Of `first_view` and all taken after it, those of its epoch get a turntable offset of their own,
+  // those of its mounting a placing of their own; `parameters` grows by it, equal to what it was
+  // split from.
+  void SplitEpoch(int first_view, const std::string& name, double sigma_rad,
+                  RigParameters& parameters);
+  void SplitMounting(int first_view, const std::string& id, RigParameters& parameters);
   // The turntable turns against the sign of its log.
   void ReverseTurntable();
 

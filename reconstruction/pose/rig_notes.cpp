@@ -24,16 +24,36 @@ double SigmaAlong(const RigPosterior& posterior, int a, int b, const Eigen::Vect
   return std::sqrt(std::max(0.0, direction.dot(difference * direction)));
 }
 
-std::string StepsNote(const PhotoSet& photos, const RigParameters& parameters,
+// The last view taken before `view` of those that `same` says belong with it; `view` without any.
+template <class Same>
+int TakenBefore(const RigModel& rig, int view, Same&& same) {
+  const auto taken = [&](int i) { return rig.views()[static_cast<std::size_t>(i)].taken; };
+  int last = view;
+  for (int i = 0; i < static_cast<int>(rig.views().size()); ++i) {
+    if (!same(i) || taken(i) >= taken(view)) continue;
+    if (last == view || taken(i) > taken(last)) last = i;
+  }
+  return last;
+}
+
+std::string StepsNote(const PhotoSet& photos, const RigModel& rig, const RigParameters& parameters,
                       const RigPosterior& posterior, const RigChange& change) {
-  const double turned_rad = parameters.epochs[static_cast<std::size_t>(change.after)] -
-                            parameters.epochs[static_cast<std::size_t>(change.before)];
-  const double sigma_rad = SigmaOfDifference(posterior, posterior.layout.epoch(change.after),
-                                             posterior.layout.epoch(change.before));
+  const auto epoch_of = [&](int i) {
+    return photos.photos[static_cast<std::size_t>(i)].reference_epoch;
+  };
+  const int last = TakenBefore(rig, change.view, [&](int i) {
+    return rig.views()[i].turns && epoch_of(i) == epoch_of(change.view);
+  });
+  const int before = rig.views()[last].epoch;
+  const int after = rig.views()[change.view].epoch;
+  const double turned_rad = parameters.epochs[static_cast<std::size_t>(after)] -
+                            parameters.epochs[static_cast<std::size_t>(before)];
+  const double sigma_rad =
+      SigmaOfDifference(posterior, posterior.layout.epoch(after), posterior.layout.epoch(before));
   return fmt::format(
-      "From view {} on the turntable stands {:+.2f}° (σ {:.2f}°) from where the log says: lost "
-      "steps, or something turned it. Compensated; home it again, and run it slower or with more "
-      "current.",
+      "From view {} on the turntable stands {:+.2f}° (σ {:.2f}°) from where the log and the views "
+      "before it put it: lost steps, or something turned it. Compensated; home it again, and run "
+      "it slower or with more current.",
       photos.photos[static_cast<std::size_t>(change.view)].name, DegFromRad(turned_rad),
       DegFromRad(sigma_rad));
 }
@@ -41,15 +61,19 @@ std::string StepsNote(const PhotoSet& photos, const RigParameters& parameters,
 std::string MovedNote(const PhotoSet& photos, const RigModel& rig, const RigParameters& parameters,
                       const RigPosterior& posterior, const RigChange& change,
                       const Eigen::Vector3d& specimen) {
-  const TableFromModel before = rig.TableFromModelOf(parameters, change.before);
-  const TableFromModel after = rig.TableFromModelOf(parameters, change.after);
+  const auto mounting_of = [&](int i) {
+    return photos.photos[static_cast<std::size_t>(i)].mounting_id;
+  };
+  const int last = TakenBefore(rig, change.view, [&](int i) {
+    return rig.views()[i].logged && mounting_of(i) == mounting_of(change.view);
+  });
+  const int mounting = rig.views()[change.view].mounting, left = rig.views()[last].mounting;
+  const TableFromModel before = rig.TableFromModelOf(parameters, left);
+  const TableFromModel after = rig.TableFromModelOf(parameters, mounting);
   const Vector6d motion = MotionBetween(before, after, before * specimen);
-  const int a = posterior.layout.mounting(change.after);
-  const int b = posterior.layout.mounting(change.before);
+  const int a = posterior.layout.mounting(mounting);
+  const int b = posterior.layout.mounting(left);
   const Eigen::Vector3d axis = motion.head<3>().normalized();
-  // The view before it of the same placing.
-  int last = change.view - 1;
-  while (last > 0 && rig.views()[last].mounting != change.before) --last;
   return fmt::format(
       "Between views {} and {} the specimen moved on the table: it turned by {:.2f}° (σ {:.2f}°) "
       "and its mass centre went {:.2f} mm. Compensated by a placing of its own, {}; fasten the "
@@ -57,7 +81,7 @@ std::string MovedNote(const PhotoSet& photos, const RigModel& rig, const RigPara
       photos.photos[static_cast<std::size_t>(last)].name,
       photos.photos[static_cast<std::size_t>(change.view)].name,
       DegFromRad(motion.head<3>().norm()), DegFromRad(SigmaAlong(posterior, a, b, axis)),
-      motion.tail<3>().norm(), rig.mounting_ids()[static_cast<std::size_t>(change.after)]);
+      motion.tail<3>().norm(), rig.mounting_ids()[static_cast<std::size_t>(mounting)]);
 }
 
 }  // namespace
@@ -70,8 +94,8 @@ std::vector<std::string> RigNotes(const PhotoSet& photos, const RigModel& rig,
   std::vector<bool> split(rig.epoch_names().size(), false);
   for (const RigChange& change : changes) {
     if (change.kind == RigChange::Kind::steps_lost) {
-      notes.push_back(StepsNote(photos, parameters, posterior, change));
-      split[static_cast<std::size_t>(change.after)] = true;
+      notes.push_back(StepsNote(photos, rig, parameters, posterior, change));
+      split[static_cast<std::size_t>(rig.views()[change.view].epoch)] = true;
     } else if (change.kind == RigChange::Kind::specimen_moved) {
       notes.push_back(MovedNote(photos, rig, parameters, posterior, change, specimen));
     }

@@ -16,8 +16,7 @@
 namespace scan {
 namespace {
 
-RefineOptions ScaledTo(RefineOptions options, int width) {
-  const double scale = width / 1848.0;
+RefineOptions ScaledTo(RefineOptions options, double scale) {
   options.first_window_px *= scale;
   options.last_window_px = std::max(4.0, options.last_window_px * scale);
   // Not more in larger pictures: the noise of an outline hangs together over a few pixels whatever
@@ -32,10 +31,6 @@ std::vector<PhotoContour> PhotoContours(std::span<const Mask> masks) {
   tbb::parallel_for(std::size_t{0}, masks.size(),
                     [&](std::size_t i) { photos[i] = MakePhotoContour(masks[i]); });
   return photos;
-}
-
-double ScaleOf(const PhotoSet& photos) {
-  return photos.intrinsics(photos.photos.front()).w / 1848.0;
 }
 
 // Focal length and principal point are freed only where the data know them better than half of
@@ -65,36 +60,42 @@ double ViewPriorChi2(const RigPosterior& posterior, const RigParameters& paramet
 }
 
 // The scale of residuals that views agree on: the median of theirs.
-double PooledSigma(std::span<const ViewFit> fits, const std::vector<bool>& use) {
+double PooledSigma(std::span<const ViewFit> fits) {
   std::vector<double> sigma;
-  for (std::size_t i = 0; i < fits.size(); ++i)
-    if (use[i]) sigma.push_back(fits[i].sigma_px);
+  for (const ViewFit& fit : fits)
+    if (fit.sigma_px > 0) sigma.push_back(fit.sigma_px);  // else it took no part
   if (sigma.empty()) return 0;
   std::sort(sigma.begin(), sigma.end());
   return sigma[sigma.size() / 2];
 }
+
+// What the steps of the solve share.
+struct Evidence {
+  const ContourMesh& mesh;
+  std::span<const PhotoContour> photos;
+  const JointOptions& options;
+  RefineOptions refine;  // scaled to the photos
+  double scale = 1;      // 1 px of a picture 1848 px wide
+};
 
 struct Judgement {
   Explained explained;
   std::string reason;
 };
 
-std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
-                             std::span<const PhotoContour> photos, const RefineResult& fit,
-                             const std::vector<bool>& use, const JointOptions& options,
-                             double scale, double spacing_px) {
+std::vector<Judgement> Judge(const Evidence& in, const RigModel& rig, const RefineResult& fit) {
   // A contour of coverage is rounded at the specimen's corners by about this, however small the
   // photograph.
   constexpr double kCornerPx = 0.25;
   const RigPosterior posterior = PosteriorOf(rig, fit);
   const double tolerance_px =
-      options.acceptance.sigmas *
-      std::max({PooledSigma(fit.fits, use), scale * options.acceptance.sigma_floor_px, kCornerPx});
-  std::vector<Judgement> judgements(photos.size());
-  tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
+      in.options.acceptance.sigmas *
+      std::max({PooledSigma(fit.fits), in.scale * in.options.acceptance.sigma_floor_px, kCornerPx});
+  std::vector<Judgement> judgements(in.photos.size());
+  tbb::parallel_for(std::size_t{0}, in.photos.size(), [&](std::size_t i) {
     const int view = static_cast<int>(i);
     Judgement& judgement = judgements[i];
-    if (photos[i].empty()) {
+    if (in.photos[i].empty()) {
       judgement.reason = "the mask is empty: no specimen was found in the photograph";
       return;
     }
@@ -105,9 +106,10 @@ std::vector<Judgement> Judge(const ContourMesh& mesh, const RigModel& rig,
     const ViewState state{rig.CameraFromModelOf(fit.parameters, view),
                           rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens),
                           fit.parameters.mask_bias_px};
-    judgement.explained = ExplainedShares(mesh, photos[i], state, tolerance_px, spacing_px);
+    judgement.explained =
+        ExplainedShares(in.mesh, in.photos[i], state, tolerance_px, in.refine.spacing_px);
     judgement.reason = RejectionReason(
-        judgement.explained, ViewPriorChi2(posterior, fit.parameters, view), options.acceptance);
+        judgement.explained, ViewPriorChi2(posterior, fit.parameters, view), in.options.acceptance);
   });
   return judgements;
 }
@@ -117,25 +119,22 @@ constexpr const char* kReversedNote =
     "fit. Mend the sign of the turntable in the station file.";
 
 // Views that the change analysis took out say why, where their own outline has a pose to show.
-void RejectViewsAlone(const ContourMesh& mesh, const RigModel& rig,
-                      std::span<const PhotoContour> photos, const RigParameters& parameters,
-                      std::span<const RigChange> changes, const RefineOptions& refine,
-                      std::vector<Judgement>& judgements) {
-  std::vector<bool> alone(photos.size(), false);
+void RejectViewsAlone(const Evidence& in, const RigModel& rig, const RigParameters& parameters,
+                      std::span<const RigChange> changes, std::vector<Judgement>& judgements) {
+  std::vector<bool> alone(in.photos.size(), false);
   for (const RigChange& change : changes)
     if (change.kind == RigChange::Kind::view_alone) alone[change.view] = true;
-  const RigEvidence seen = EvidenceOfViewsAlone(mesh, rig, photos, alone, parameters,
-                                                refine.correlation_floor_px, refine);
-  for (std::size_t i = 0; i < photos.size(); ++i) {
+  const RigEvidence seen = EvidenceOfViewsAlone(in.mesh, rig, in.photos, alone, parameters,
+                                                in.refine.correlation_floor_px, in.refine);
+  for (std::size_t i = 0; i < in.photos.size(); ++i) {
     if (!seen[i]) continue;
-    const double unit = refine.last_window_px / 8;
-    const Explained explained =
-        ExplainedShares(mesh, photos[i], seen[i]->state, 1.5 * unit + 0.5, refine.spacing_px);
+    const Explained explained = ExplainedShares(
+        in.mesh, in.photos[i], seen[i]->state, 1.5 * UnitPx(in.refine) + 0.5, in.refine.spacing_px);
     const bool has_pose = RejectionReason(explained, 0, {}).empty();
     if (!has_pose && !judgements[i].reason.empty()) continue;
     judgements[i].reason =
         ReasonOfViewAlone(seen[i]->state.camera_from_model,
-                          rig.CameraFromModelOf(parameters, static_cast<int>(i)), mesh.centre);
+                          rig.CameraFromModelOf(parameters, static_cast<int>(i)), in.mesh.centre);
   }
 }
 
@@ -190,32 +189,32 @@ using Alternatives = std::vector<std::vector<AlternativePose>>;
 
 // Finds a start for every photograph without a nominal pose and marks its mounting as known; one
 // that has none is left out of `use`. Returns what each cannot decide between.
-Alternatives StartViewsAlone(const ContourMesh& mesh, const PhotoSet& photos,
-                             std::span<const PhotoContour> contours, const JointOptions& options,
-                             const RefineOptions& refine, RigModel& rig, std::vector<bool>& use,
-                             std::vector<bool>& known, const std::stop_token& stop) {
+Alternatives StartViewsAlone(const Evidence& in, const PhotoSet& photos, RigModel& rig,
+                             std::vector<bool>& use, std::vector<bool>& known,
+                             const std::stop_token& stop) {
   constexpr double kUndecided = 4.6;  // log-likelihood: 1 to 100
-  Alternatives alternatives(contours.size());
+  Alternatives alternatives(in.photos.size());
   std::vector<int> alone;
-  for (std::size_t i = 0; i < contours.size(); ++i)
+  for (std::size_t i = 0; i < in.photos.size(); ++i)
     if (use[i] && !rig.views()[i].logged) alone.push_back(static_cast<int>(i));
   if (alone.empty()) return alternatives;
   const double distance_mm = photos.approx_distance_mm.value_or(0);
-  auto search = options.view_search;
+  auto search = in.options.view_search;
   if (!search)
-    search = std::make_shared<ViewSearch>(mesh, distance_mm, options.start, options.view_start);
+    search =
+        std::make_shared<ViewSearch>(in.mesh, distance_mm, in.options.start, in.options.view_start);
   std::vector<std::vector<ViewCandidate>> found(alone.size());
   tbb::parallel_for(std::size_t{0}, alone.size(), [&](std::size_t k) {
     const auto i = static_cast<std::size_t>(alone[k]);
-    found[k] = search->Solve(contours[i], rig.nominal_intrinsics(rig.views()[i].lens), distance_mm,
-                             refine, stop);
+    found[k] = search->Solve(in.photos[i], rig.nominal_intrinsics(rig.views()[i].lens), distance_mm,
+                             in.refine, stop);
   });
   for (std::size_t k = 0; k < alone.size(); ++k) {
     const auto i = static_cast<std::size_t>(alone[k]);
     use[i] = !found[k].empty();
     known[rig.views()[i].mounting] = true;
     if (found[k].empty()) continue;
-    rig.set_view_start(alone[k], found[k].front().camera_from_model, mesh.centre);
+    rig.set_view_start(alone[k], found[k].front().camera_from_model, in.mesh.centre);
     for (std::size_t c = 1; c < found[k].size(); ++c) {
       const double gap = found[k][c].misfit - found[k].front().misfit;
       if (gap < kUndecided) alternatives[i].push_back({found[k][c].camera_from_model, gap});
@@ -256,20 +255,68 @@ std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigMode
 
 // Residuals of a good fit leave nothing to ask: the scale is looked at only above a pixel of a
 // picture 1848 px wide.
-void RejectRefutedScale(const ContourMesh& mesh, const RigModel& rig,
-                        std::span<const PhotoContour> photos, const std::vector<bool>& views,
-                        const RefineResult& fit, RefineOptions refine, double scale,
-                        std::vector<Judgement>& judgements, std::stop_token stop) {
+void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vector<bool>& views,
+                        const RefineResult& fit, std::vector<Judgement>& judgements,
+                        std::stop_token stop) {
   const auto stands = [&](std::size_t i) {
     return rig.views()[i].logged && judgements[i].reason.empty();
   };
   bool any = false;
   for (std::size_t i = 0; i < judgements.size(); ++i) any |= stands(i);
-  if (!any || PooledSigma(fit.fits, views) < scale) return;
+  if (!any || PooledSigma(fit.fits) < in.scale) return;
+  RefineOptions refine = in.refine;
   refine.first_window_px = 4 * refine.last_window_px;
-  const std::string reason = RefutedScale(mesh, rig, photos, views, fit, refine, stop);
+  const std::string reason = RefutedScale(in.mesh, rig, in.photos, views, fit, refine, stop);
   for (std::size_t i = 0; i < judgements.size(); ++i)
     if (stands(i)) judgements[i].reason = reason;
+}
+
+// Frees what the photographs show of the cameras, takes out the views that disagree and solves the
+// others again, so that nothing of them is spread; then judges every view once more at the pose
+// that the others give it.
+std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
+                              const std::stop_token& stop) {
+  RigModel& rig = attempt.rig;
+  RefineResult& fit = attempt.fit;
+  RefineOptions again = in.refine;
+  again.first_window_px = 2 * in.refine.last_window_px;
+  if (FreeWhatIsSeen(rig, PosteriorOf(rig, fit)))
+    fit = RefineJoint(in.mesh, rig, in.photos, attempt.use, fit.parameters, again, stop);
+  auto judgements = Judge(in, rig, fit);
+  std::vector<bool> agree = attempt.use;
+  for (std::size_t i = 0; i < agree.size(); ++i)
+    agree[i] = agree[i] && judgements[i].reason.empty();
+  if (agree != attempt.use && std::any_of(agree.begin(), agree.end(), [](bool a) { return a; })) {
+    fit = RefineJoint(in.mesh, rig, in.photos, agree, fit.parameters, again, stop);
+    judgements = Judge(in, rig, fit);
+  }
+  RejectRefutedScale(in, rig, agree, fit, judgements, stop);
+  RejectViewsAlone(in, rig, fit.parameters, attempt.changes, judgements);
+  return judgements;
+}
+
+// Everything that the result says of a solve.
+Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask> masks,
+               const RigAttempt& attempt, std::span<const Judgement> judgements) {
+  const RigModel& rig = attempt.rig;
+  const RefineResult& fit = attempt.fit;
+  ObservabilityOptions observability;
+  observability.weights.correlation_px = fit.correlation_px;
+  RigPosterior posterior = PosteriorOf(rig, fit);
+  const std::vector<std::string> notes =
+      RigNotes(photos, rig, fit.parameters, posterior, attempt.changes, in.mesh.centre);
+  const auto free = FreeDirections(in.mesh, rig, fit, judgements, observability);
+  for (const FreeDirection& direction : free) AddFreedom(rig, fit.parameters, direction, posterior);
+  Poses poses = Describe(in.mesh, photos, masks, rig, fit, posterior, judgements);
+  poses.model = in.options.model;
+  poses.free_directions = ByView(photos, free);
+  poses.nuisances["residual_sigma_px"].value = PooledSigma(fit.fits);
+  poses.nuisances["residual_correlation_px"].value = fit.correlation_px;
+  if (attempt.reversed) poses.notes.push_back(kReversedNote);
+  poses.notes.insert(poses.notes.end(), notes.begin(), notes.end());
+  for (const FreeDirection& direction : poses.free_directions)
+    poses.notes.push_back(Sentence(direction));
+  return poses;
 }
 
 }  // namespace
@@ -293,60 +340,23 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
     known[m] = placing != options.table_from_model.end();
     if (known[m]) rig.set_start(static_cast<int>(m), placing->second);
   }
-  const double scale = ScaleOf(photos);
-  const RefineOptions refine = ScaledTo(options.refine, photos.intrinsics(photos.photos.front()).w);
+  const double scale = photos.intrinsics(photos.photos.front()).w / 1848.0;
+  const Evidence in{contour_mesh, contours, options, ScaledTo(options.refine, scale), scale};
   Report(progress, "poses: search", 0.0);
-  const Alternatives alternatives =
-      StartViewsAlone(contour_mesh, photos, contours, options, refine, rig, use, known, stop);
+  const Alternatives alternatives = StartViewsAlone(in, photos, rig, use, known, stop);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: refine", 0.5);
   std::vector<std::string> names;
   for (const Photo& photo : photos.photos) names.push_back(photo.id);
   SCAN_TRY(RigAttempt attempt, SolveWithChanges({contour_mesh, contours, names, use, known,
-                                                 options.start, refine, options.changes},
+                                                 options.start, in.refine, options.changes},
                                                 rig, stop));
-  rig = attempt.rig;
-  RefineResult& fit = attempt.fit;
-  auto judgements =
-      Judge(contour_mesh, rig, contours, fit, attempt.use, options, scale, refine.spacing_px);
-  RefineOptions again = refine;
-  again.first_window_px = 2 * refine.last_window_px;
-  if (FreeWhatIsSeen(rig, PosteriorOf(rig, fit))) {
-    fit = RefineJoint(contour_mesh, rig, contours, attempt.use, fit.parameters, again, stop);
-    judgements =
-        Judge(contour_mesh, rig, contours, fit, attempt.use, options, scale, refine.spacing_px);
-  }
-  // Views that disagree are taken out and the others solved again, so that nothing of them is
-  // spread; then every view is judged once more at the pose that the others give it.
-  std::vector<bool> agree = attempt.use;
-  for (std::size_t i = 0; i < use.size(); ++i) agree[i] = agree[i] && judgements[i].reason.empty();
-  if (agree != attempt.use && std::any_of(agree.begin(), agree.end(), [](bool a) { return a; })) {
-    fit = RefineJoint(contour_mesh, rig, contours, agree, fit.parameters, again, stop);
-    judgements = Judge(contour_mesh, rig, contours, fit, agree, options, scale, refine.spacing_px);
-  }
-  RejectRefutedScale(contour_mesh, rig, contours, agree, fit, refine, scale, judgements, stop);
+  const std::vector<Judgement> judgements = Settle(in, attempt, stop);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
-  RejectViewsAlone(contour_mesh, rig, contours, fit.parameters, attempt.changes, refine,
-                   judgements);
-  ObservabilityOptions observability;
-  observability.weights.correlation_px = fit.correlation_px;
-  RigPosterior posterior = PosteriorOf(rig, fit);
-  const std::vector<std::string> notes =
-      RigNotes(photos, rig, fit.parameters, posterior, attempt.changes, contour_mesh.centre);
-  const auto free = FreeDirections(contour_mesh, rig, fit, judgements, observability);
-  for (const FreeDirection& direction : free) AddFreedom(rig, fit.parameters, direction, posterior);
-  Poses poses = Describe(contour_mesh, photos, masks, rig, fit, posterior, judgements);
-  poses.model = options.model;
-  poses.free_directions = ByView(photos, free);
+  Poses poses = Conclude(in, photos, masks, attempt, judgements);
   for (std::size_t i = 0; i < alternatives.size(); ++i)
     poses.views[i].alternatives = alternatives[i];
-  poses.nuisances["residual_sigma_px"].value = PooledSigma(fit.fits, use);
-  poses.nuisances["residual_correlation_px"].value = fit.correlation_px;
-  if (attempt.reversed) poses.notes.push_back(kReversedNote);
-  poses.notes.insert(poses.notes.end(), notes.begin(), notes.end());
-  for (const FreeDirection& direction : poses.free_directions)
-    poses.notes.push_back(Sentence(direction));
   return poses;
 }
 

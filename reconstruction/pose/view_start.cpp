@@ -164,7 +164,7 @@ std::vector<ViewCandidate> ViewSearch::Solve(const PhotoContour& photo, const In
                                              double distance_mm, const RefineOptions& refine,
                                              std::stop_token stop) const {
   if (photo.empty() || !(photo.area_px > 0) || stop.stop_requested()) return {};
-  const double unit = refine.last_window_px / 8;  // 1 at 1848 px
+  const double unit = UnitPx(refine);
   RefineOptions rough = refine;
   rough.first_window_px = std::max(60 * unit, 0.08 * photo.diameter_px);
   rough.last_window_px = 16 * unit;

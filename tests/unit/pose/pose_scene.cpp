@@ -141,6 +141,15 @@ Mask RenderMask(const TriangleMesh& mesh, const CameraFromModel& camera_from_mod
   return mask;
 }
 
+SceneOptions MediumPhotos(int views, bool static_errors) {
+  SceneOptions options;
+  options.w = 924;
+  options.h = 612;
+  options.views = views;
+  options.static_errors = static_errors;
+  return options;
+}
+
 Scene MakeScene(const TriangleMesh& mesh, const TableFromModel& table_from_model,
                 const SceneOptions& options) {
   Scene scene;

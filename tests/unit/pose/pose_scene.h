@@ -38,6 +38,9 @@ struct SceneOptions {
   SceneFaults faults{};
 };
 
+// Photographs of 924 x 612.
+SceneOptions MediumPhotos(int views, bool static_errors = false);
+
 struct Scene {
   PhotoSet photos;
   std::vector<Mask> masks;

@@ -78,14 +78,10 @@ double AngleDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 // Photographs of the exact body, solved with `mesh`.
 void ExpectFreeAzimuth(const TriangleMesh& mesh) {
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 8;
-  options.static_errors = true;
-  const test::Scene scene = test::MakeScene(
-      ExactSurface(Tomato(), 0.3),
-      TableFromModel(ExpSo3({0.1, -0.15, 1.3}), Eigen::Vector3d(1.5, -2, 1)), options);
+  const test::Scene scene =
+      test::MakeScene(ExactSurface(Tomato(), 0.3),
+                      TableFromModel(ExpSo3({0.1, -0.15, 1.3}), Eigen::Vector3d(1.5, -2, 1)),
+                      test::MediumPhotos(8, true));
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, {});
   ASSERT_TRUE(poses) << ToString(poses.error());
   ASSERT_EQ(poses->free_directions.size(), 1u);

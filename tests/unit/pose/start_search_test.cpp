@@ -71,11 +71,7 @@ TEST(SearchStarts, FindsAnyPlacing) {
 
 TEST(SolveJoint, UnknownPlacingAndStaticRigErrors) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 8;
-  options.static_errors = true;
+  const test::SceneOptions options = test::MediumPhotos(8, true);
   const test::Scene scene = test::MakeScene(
       mesh, TableFromModel(ExpSo3({1.0, -2.0, 0.5}), Eigen::Vector3d(2, 1, 10)), options);
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, CoarseSearch());
@@ -93,10 +89,7 @@ TEST(SolveJoint, UnknownPlacingAndStaticRigErrors) {
 
 TEST(SolveJoint, AMirroredMeshIsRejected) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 8;
+  const test::SceneOptions options = test::MediumPhotos(8);
   const test::Scene scene = test::MakeScene(
       mesh, TableFromModel(ExpSo3({0.1, 0.2, 0.5}), Eigen::Vector3d(2, 1, 3)), options);
   TriangleMesh mirrored = mesh;
@@ -110,11 +103,7 @@ TEST(SolveJoint, AMirroredMeshIsRejected) {
 TEST(SolveJoint, AnExactBodyOfRevolutionHasAFreeAzimuth) {
   const Eigen::Vector3d axis = Eigen::Vector3d(0.2, -0.3, 1).normalized();
   const TriangleMesh mesh = test::RevolutionMesh(120, axis);
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 8;
-  options.static_errors = true;
+  const test::SceneOptions options = test::MediumPhotos(8, true);
   const test::Scene scene = test::MakeScene(
       mesh, TableFromModel(ExpSo3({0.3, 0.2, 0.5}), Eigen::Vector3d(2, 1, 12)), options);
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, CoarseSearch());
@@ -139,10 +128,7 @@ TEST(SolveJoint, AnExactBodyOfRevolutionHasAFreeAzimuth) {
 
 TEST(SolveJoint, AnAsymmetricBodyHasNoFreeDirection) {
   const TriangleMesh mesh = test::BugMesh(2);
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 6;
+  const test::SceneOptions options = test::MediumPhotos(6);
   const test::Scene scene = test::MakeScene(
       mesh, TableFromModel(ExpSo3({0.3, 0.2, 0.5}), Eigen::Vector3d(2, 1, 2)), options);
   const auto poses = SolveJoint(mesh, scene.photos, scene.masks, CoarseSearch());

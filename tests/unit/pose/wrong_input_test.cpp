@@ -13,12 +13,8 @@ namespace scan {
 namespace {
 
 test::Scene EightViews(const TriangleMesh& mesh) {
-  test::SceneOptions options;
-  options.w = 924;
-  options.h = 612;
-  options.views = 8;
   return test::MakeScene(mesh, TableFromModel(ExpSo3({0.1, 0.2, 0.5}), Eigen::Vector3d(2, 1, 3)),
-                         options);
+                         test::MediumPhotos(8));
 }
 
 JointOptions FewerDirections() {

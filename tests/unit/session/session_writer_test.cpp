@@ -55,6 +55,7 @@ TEST(SessionWriter, RefusesASecondFrameOfAViewWithoutARetake) {
   const auto set = LoadPhotoSet(folder);
   ASSERT_TRUE(IsOk(set));
   EXPECT_EQ(set->photos.at(0).path.filename(), "v000_c0_r1.png");
+  EXPECT_GT(set->photos.at(0).capture_seq, *seq);  // when it was retaken
 }
 
 TEST(SessionWriter, TwoWritersOfOneSessionAreRefused) {
