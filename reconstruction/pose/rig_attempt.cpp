@@ -12,7 +12,6 @@ namespace {
 
 // Changes in turn uncover each other: what is left after the first solve is looked at again.
 constexpr int kRounds = 2;
-constexpr double kExplainedPx = 3;  // mean distance of outlines, in a picture 1848 px wide
 
 bool AnyLogged(const RigModel& rig) {
   return std::any_of(rig.views().begin(), rig.views().end(),

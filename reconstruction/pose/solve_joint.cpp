@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "reconstruction/pose/joint_result.h"
 #include "reconstruction/pose/observability.h"
@@ -271,6 +272,41 @@ void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vect
     if (stands(i)) judgements[i].reason = reason;
 }
 
+// The specimen as it stands in the photographs.
+struct BentSpecimen {
+  std::vector<BentPart> parts;
+  TriangleMesh mesh;
+  std::optional<ContourMesh> contours;  // of `mesh`; none where nothing was bent
+};
+
+// Finds what was bent since the CT and solves again with it bent in the mesh too: left out, it
+// would leave the poses to the rest, which knows them less well.
+void AllowForBends(const Evidence& in, RigAttempt& attempt, BentSpecimen& specimen,
+                   const std::stop_token& stop) {
+  constexpr int kBendRounds = 4;
+  const BentPartOptions& options = in.options.bent_parts;
+  if (std::count(attempt.use.begin(), attempt.use.end(), true) < options.least_views ||
+      attempt.distance_px > kExplainedPx * UnitPx(in.refine))
+    return;
+  RefineResult& fit = attempt.fit;
+  RefineOptions again = in.refine;
+  again.first_window_px = 2 * in.refine.last_window_px;
+  const auto fits_of = [&](const ContourMesh& mesh) {
+    return FitViews(mesh, attempt.rig, in.photos, attempt.use, fit.parameters,
+                    again.first_window_px, fit.correlation_px, in.refine);
+  };
+  specimen.parts = FindBentParts(in.mesh, fits_of(in.mesh), options);
+  if (specimen.parts.empty()) return;
+  for (int round = 0; round < kBendRounds && !stop.stop_requested(); ++round) {
+    if (round > 0)
+      RefineBends(*specimen.contours, fits_of(*specimen.contours), options, specimen.parts);
+    specimen.mesh = WithBends(in.mesh.mesh, specimen.parts);
+    specimen.contours.emplace(specimen.mesh);
+    fit = RefineJoint(*specimen.contours, attempt.rig, in.photos, attempt.use, fit.parameters,
+                      again, stop);
+  }
+}
+
 // Frees what the photographs show of the cameras, takes out the views that disagree and solves the
 // others again, so that nothing of them is spread; then judges every view once more at the pose
 // that the others give it.
@@ -351,10 +387,15 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   SCAN_TRY(RigAttempt attempt, SolveWithChanges({contour_mesh, contours, names, use, known,
                                                  options.start, in.refine, options.changes},
                                                 rig, stop));
-  const std::vector<Judgement> judgements = Settle(in, attempt, stop);
+  BentSpecimen bent;
+  AllowForBends(in, attempt, bent, stop);
+  const Evidence settled{bent.contours ? *bent.contours : contour_mesh, contours, options,
+                         in.refine, scale};
+  const std::vector<Judgement> judgements = Settle(settled, attempt, stop);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
-  Poses poses = Conclude(in, photos, masks, attempt, judgements);
+  Poses poses = Conclude(settled, photos, masks, attempt, judgements);
+  for (const BentPart& part : bent.parts) poses.notes.push_back(BentPartNote(part));
   for (std::size_t i = 0; i < alternatives.size(); ++i)
     poses.views[i].alternatives = alternatives[i];
   return poses;
