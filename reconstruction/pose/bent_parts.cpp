@@ -298,9 +298,8 @@ std::string BentPartNote(const BentPart& part) {
   const Eigen::AngleAxisd turn(part.rotation);
   return fmt::format(
       "The part around ({:.1f}, {:.1f}, {:.1f}) mm of the model frame, about {:.1f} mm long, "
-      "stands "
-      "{:.1f} px off in {} views: it was probably bent since the CT, by about {:.1f}°. The poses "
-      "allow for that; colours on it may be misplaced.",
+      "stands {:.1f} px off in {} views: it was probably bent since the CT, by about {:.1f}°. The "
+      "poses allow for that; colours on it may be misplaced.",
       part.centre.x(), part.centre.y(), part.centre.z(), part.length_mm, part.distance_px,
       part.views, DegFromRad(turn.angle()));
 }
