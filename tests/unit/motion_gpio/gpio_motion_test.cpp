@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <iostream>
 #include <thread>
 
 #include "drivers/io/gpio/sim_gpio_board.h"
@@ -81,6 +82,17 @@ struct Bench {
   std::jthread switches;
 };
 
+// What comes before a test's own question: where a busy machine brings the news of a switch too
+// late, homing refuses and is asked again.
+bool HomedForTheTest(Motion& motion) {
+  for (int tries = 0; tries < 3; ++tries) {
+    const auto homed = motion.Home({});
+    if (homed) return true;
+    std::cout << ToString(homed.error()) << "\n";
+  }
+  return false;
+}
+
 TEST(GpioMotion, StepsOnTheLinesAreThoseCounted) {
   Bench bench;
   const auto motion = bench.Make();
@@ -101,7 +113,7 @@ TEST(GpioMotion, AnEmergencyStopCutsTheCurrentAndIsLatched) {
   Bench bench;
   const auto motion = bench.Make();
   ASSERT_TRUE(motion);
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
   std::thread presser([&] {
     const std::int64_t from = bench.edges;
     while (bench.edges - from < 100) SystemClock().SleepFor(100'000);
@@ -127,7 +139,7 @@ TEST(GpioMotion, AnEmergencyStopCutsTheCurrentAndIsLatched) {
   EXPECT_FALSE(motion->MoveTo({0, 0, "a0"}, {})) << "not homed";
   EXPECT_EQ(bench.edges, edges);
   bench.position[kTurnStep] = -60;
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
   EXPECT_TRUE(motion->MoveTo({1, 1, "a0"}, {}));
 }
 
@@ -159,7 +171,7 @@ TEST(GpioMotion, ASupplyThatTheEmergencyStopDoesNotCutIsAFault) {
   PowerBench bench;
   const auto motion = bench.Make();
   ASSERT_TRUE(motion);
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
   bench.board->Drive("ESTOP", true);
   PowerBench::Until(*motion, "emergency stop, motor power not cut by the emergency stop");
   EXPECT_EQ(motion->ReadStatus().alarm, Alarm::invalid);
@@ -169,14 +181,14 @@ TEST(GpioMotion, ASupplyThatTheEmergencyStopDoesNotCutIsAFault) {
     ASSERT_TRUE(motion->Acknowledge());
     SystemClock().SleepFor(100'000);
   }
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
 }
 
 TEST(GpioMotion, ASupplyThatGoesEndsTheMoveAndNeedsHoming) {
   PowerBench bench;
   const auto motion = bench.Make();
   ASSERT_TRUE(motion);
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
   std::thread unplugger([&] {
     const std::int64_t from = bench.edges;
     while (bench.edges - from < 100) SystemClock().SleepFor(100'000);
@@ -194,7 +206,7 @@ TEST(GpioMotion, ASupplyThatGoesEndsTheMoveAndNeedsHoming) {
   }
   EXPECT_FALSE(motion->MoveTo({0, 0, "a0"}, {})) << "not homed";
   bench.position[kTurnStep] = -60;
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
 }
 
 TEST(GpioMotion, AnEmergencyStopThatCutsTheSupplyIsNoFaultOfItsOwn) {
@@ -202,7 +214,7 @@ TEST(GpioMotion, AnEmergencyStopThatCutsTheSupplyIsNoFaultOfItsOwn) {
   bench.parts.gpio.power_off_ms = 10'000;
   const auto motion = bench.Make();
   ASSERT_TRUE(motion);
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
   bench.board->Drive("ESTOP", true);
   bench.board->Drive("POWER", false);
   PowerBench::Until(*motion, "emergency stop, motor power off");
@@ -214,7 +226,7 @@ TEST(GpioMotion, AnOpenCoverStopsAMoveAndForbidsTheNext) {
   bench.parts.gpio.cover = {"COVER"};
   const auto motion = bench.Make();
   ASSERT_TRUE(motion);
-  ASSERT_TRUE(motion->Home({}));
+  ASSERT_TRUE(HomedForTheTest(*motion));
   std::thread opener([&] {
     const std::int64_t from = bench.edges;
     while (bench.edges - from < 100) SystemClock().SleepFor(100'000);
