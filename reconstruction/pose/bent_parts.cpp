@@ -9,13 +9,12 @@
 #include <optional>
 
 #include "drivers/base/units.h"
+#include "reconstruction/pose/poses.h"
 #include "reconstruction/pose/rigid_motion.h"
 #include "reconstruction/pose/surface_cells.h"
 
 namespace scan {
 namespace {
-
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 // The residuals of a piece of surface, as a quadratic of a rigid motion about the mass centre.
 struct Residuals {
@@ -38,15 +37,6 @@ struct Residuals {
     return squares + 2 * g.dot(motion) + motion.dot(H * motion);
   }
 };
-
-double MedianSigma(std::span<const ViewFit> fits) {
-  std::vector<double> sigma;
-  for (const ViewFit& fit : fits)
-    if (fit.evidence) sigma.push_back(fit.sigma_px);
-  if (sigma.empty()) return 0;
-  std::sort(sigma.begin(), sigma.end());
-  return sigma[sigma.size() / 2];
-}
 
 Residuals ResidualOf(const ViewFit& fit, const ContourMatch& match, const Eigen::Vector3d& centre,
                      double sigma_px) {
@@ -111,7 +101,7 @@ class PartSearch {
         residuals_(cells_.centre.size()),
         taken_(cells_.centre.size(), false),
         tips_(TipsOf(cells_, mesh.centre, kTipsApart * cells_.size_mm)),
-        sigma_px_(MedianSigma(fits)) {
+        sigma_px_(PooledSigma(fits)) {
     for (const ViewFit& fit : fits_) {
       if (!fit.evidence) continue;
       for (const ContourMatch& match : fit.match.matches) {
@@ -258,7 +248,7 @@ std::vector<BentPart> FindBentParts(const ContourMesh& mesh, std::span<const Vie
 
 void RefineBends(const ContourMesh& bent, std::span<const ViewFit> fits,
                  const BentPartOptions& options, std::vector<BentPart>& parts) {
-  const double sigma_px = MedianSigma(fits);
+  const double sigma_px = PooledSigma(fits);
   std::vector<int> part_of(bent.mesh.vertices.size(), -1);
   for (std::size_t p = 0; p < parts.size(); ++p)
     for (const auto& [vertex, share] : parts[p].vertices)

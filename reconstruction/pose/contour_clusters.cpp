@@ -51,12 +51,6 @@ std::uint32_t MortonCode(const Eigen::Vector3d& in_unit_cube) {
   return code;
 }
 
-bool RunsForward(const Face& face, const std::array<std::uint32_t, 2>& edge) {
-  for (std::size_t k = 0; k < 3; ++k)
-    if (face[k] == edge[0] && face[(k + 1) % 3] == edge[1]) return true;
-  return false;
-}
-
 Key KeyOf(const TriangleMesh& mesh, const MeshEdges& edges, std::uint32_t index,
           const std::vector<Eigen::Vector3d>& normals, const BoundingBox& box) {
   const MeshEdge& edge = edges.edges[index];
@@ -77,12 +71,6 @@ Key KeyOf(const TriangleMesh& mesh, const MeshEdges& edges, std::uint32_t index,
   key.sharpness = sharpness;
   if (sharpness < kSharpness.size()) key.direction = DirectionCell(normals[f] + normals[g]);
   return key;
-}
-
-std::uint32_t CornerOpposite(const Face& face, const std::array<std::uint32_t, 2>& edge) {
-  for (const std::uint32_t v : face)
-    if (v != edge[0] && v != edge[1]) return v;
-  return edge[0];
 }
 
 // Ball and cone of a cluster whose edges are keys [begin, end).
@@ -158,7 +146,7 @@ ContourClusters MakeContourClusters(const TriangleMesh& mesh, const MeshEdges& e
                             edge.face_count});
       for (std::uint32_t k = 0; k < edge.face_count; ++k)
         made.corners.push_back(
-            point(CornerOpposite(mesh.faces[edges.faces[edge.first_face + k]], edge.vertices)));
+            point(OppositeVertex(mesh.faces[edges.faces[edge.first_face + k]], edge.vertices)));
     }
   }
   return made;

@@ -31,6 +31,15 @@ double MotionPx(const ContourMesh& mesh, const CameraFromModel& a, const CameraF
 
 }  // namespace
 
+double PooledSigma(std::span<const ViewFit> fits) {
+  std::vector<double> sigma;
+  for (const ViewFit& fit : fits)
+    if (fit.sigma_px > 0) sigma.push_back(fit.sigma_px);  // else it took no part
+  if (sigma.empty()) return 0;
+  std::sort(sigma.begin(), sigma.end());
+  return sigma[sigma.size() / 2];
+}
+
 ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
                 double window_px, double correlation_px, const RefineOptions& options) {
   ViewFit fit;

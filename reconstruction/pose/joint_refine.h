@@ -37,6 +37,9 @@ struct ViewFit {
   std::optional<CondensedEvidence> evidence;
 };
 
+// The scale of residuals that views agree on: the median of those that took part; 0 without any.
+double PooledSigma(std::span<const ViewFit> fits);
+
 struct RefineResult {
   RigParameters parameters;
   std::vector<ViewFit> fits;  // at `parameters`

@@ -60,16 +60,6 @@ double ViewPriorChi2(const RigPosterior& posterior, const RigParameters& paramet
   return chi2;
 }
 
-// The scale of residuals that views agree on: the median of theirs.
-double PooledSigma(std::span<const ViewFit> fits) {
-  std::vector<double> sigma;
-  for (const ViewFit& fit : fits)
-    if (fit.sigma_px > 0) sigma.push_back(fit.sigma_px);  // else it took no part
-  if (sigma.empty()) return 0;
-  std::sort(sigma.begin(), sigma.end());
-  return sigma[sigma.size() / 2];
-}
-
 // What the steps of the solve share.
 struct Evidence {
   const ContourMesh& mesh;

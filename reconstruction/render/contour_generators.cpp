@@ -10,24 +10,10 @@
 namespace scan {
 namespace {
 
-std::uint32_t OppositeVertex(const Face& face, const std::array<std::uint32_t, 2>& edge) {
-  for (std::uint32_t v : face) {
-    if (v != edge[0] && v != edge[1]) return v;
-  }
-  return edge[0];
-}
-
 // Which side of the plane through the camera and the edge p lies on.
 int SideOf(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& p) {
   const double side = a.cross(b).dot(p);
   return side > 0 ? 1 : (side < 0 ? -1 : 0);
-}
-
-bool RunsForward(const Face& face, const std::array<std::uint32_t, 2>& edge) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (face[k] == edge[0] && face[(k + 1) % 3] == edge[1]) return true;
-  }
-  return false;
 }
 
 int FindOutward(const TriangleMesh& mesh, const MeshEdges& edges) {
@@ -79,6 +65,20 @@ Surroundings LookAround(const Raster& raster, const Eigen::Vector2d& pixel) {
 }
 
 }  // namespace
+
+std::uint32_t OppositeVertex(const Face& face, const std::array<std::uint32_t, 2>& edge) {
+  for (std::uint32_t v : face) {
+    if (v != edge[0] && v != edge[1]) return v;
+  }
+  return edge[0];
+}
+
+bool RunsForward(const Face& face, const std::array<std::uint32_t, 2>& edge) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (face[k] == edge[0] && face[(k + 1) % 3] == edge[1]) return true;
+  }
+  return false;
+}
 
 MeshEdges BuildMeshEdges(const TriangleMesh& mesh) {
   struct Entry {

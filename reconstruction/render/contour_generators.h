@@ -25,6 +25,11 @@ struct MeshEdges {
 };
 MeshEdges BuildMeshEdges(const TriangleMesh& mesh);
 
+// Whether one of the face's sides goes from the edge's first vertex to its second.
+bool RunsForward(const Face& face, const std::array<std::uint32_t, 2>& edge);
+// The face's corner that is not on the edge; the edge's first vertex for a degenerate face.
+std::uint32_t OppositeVertex(const Face& face, const std::array<std::uint32_t, 2>& edge);
+
 struct ContourSegment {
   std::array<std::uint32_t, 2> vertices;  // of the mesh
   std::array<std::int32_t, 2> faces;      // of the mesh; -1 for the missing one of a boundary edge

@@ -47,17 +47,16 @@ double PeakMib() {
 void ForgetPeak() { std::ofstream("/proc/self/clear_refs") << 5; }
 
 PoseTrial MakeTrial(const SpeedOptions& options) {
-  const auto specimen = MakeSpecimen(options.specimen);
-  if (!specimen) throw CLI::ValidationError(ToString(specimen.error()));
+  const auto specimen = MakeSpecimen(options.specimen).value();
   PoseTrial trial;
-  trial.mesh = ExactSurface(**specimen, options.edge_mm);
+  trial.mesh = ExactSurface(*specimen, options.edge_mm);
   test::SceneOptions scene_options;
-  scene_options.w = 120;  // its masks are not used
-  scene_options.h = 80;
+  scene_options.w = 462;  // its masks are not used
+  scene_options.h = 306;
   scene_options.views = options.views;
   scene_options.static_errors = true;
   const TableFromModel placing(ExpSo3({0.02, -0.03, 0.7}), Eigen::Vector3d(0.5, -1, 14));
-  const test::Scene scene = test::MakeScene(ExactSurface(**specimen, 1), placing, scene_options);
+  const test::Scene scene = test::MakeScene(ExactSurface(*specimen, 1), placing, scene_options);
   trial.photos = scene.photos;
   for (std::size_t i = 0; i < scene.truth.size(); ++i)
     trial.truth.push_back({scene.truth[i], scene.true_intrinsics[i]});
@@ -119,7 +118,9 @@ void MeasureOutline(const PoseTrial& trial) {
 int main(int argc, char** argv) {
   scan::SpeedOptions options;
   CLI::App app("Seconds and memory of the joint solve", "bench_pose_speed");
-  app.add_option("--specimen", options.specimen)->capture_default_str();
+  app.add_option("--specimen", options.specimen)
+      ->check(CLI::IsMember(scan::SpecimenNames()))
+      ->capture_default_str();
   app.add_option("--views", options.views)->check(CLI::Range(2, 1000))->capture_default_str();
   app.add_option("--width", options.width, "of the photographs, px")
       ->check(CLI::Range(200, 8000))

@@ -8,34 +8,28 @@ namespace {
 
 const std::filesystem::path kData = std::string(SCAN_SOURCE_DIR) + "/../shared/data";
 
-// Every view counts, accepted or not.
-void ExpectWithinBars(const HullFigures& figures) {
-  EXPECT_LT(figures.calibrated.contour_px.median, 1.5);
-  EXPECT_LT(SpreadOf(figures.rotation_deg).max, 3);
+// Every posed view counts, accepted or not.
+void ExpectPosed(const RealSet& set, std::size_t views, std::size_t least_accepted) {
+  const auto trial = RunHullTrial(set, {.hull_of_all = false, .most_posed = views});
+  ASSERT_TRUE(trial) << ToString(trial.error());
+  const auto figures = FiguresOf(*trial);
+  ASSERT_TRUE(figures) << ToString(figures.error());
+  EXPECT_EQ(figures->rotation_deg.size(), views);
+  EXPECT_GE(figures->accepted, least_accepted);
+  EXPECT_LT(figures->calibrated.contour_px.median, 1.5);
+  EXPECT_LT(SpreadOf(figures->rotation_deg).max, 3);
 }
 
 TEST(RealSets, TheDinosaurIsPosedWithoutLoggedPoses) {
   const auto set = LoadDino(kData / "middlebury_dino");
   if (!set) GTEST_SKIP() << "the data folder is not here";
-  const auto trial = RunHullTrial(*set, {.hull_of_all = false, .most_posed = 4});
-  ASSERT_TRUE(trial) << ToString(trial.error());
-  const auto figures = FiguresOf(*trial);
-  ASSERT_TRUE(figures) << ToString(figures.error());
-  EXPECT_EQ(figures->rotation_deg.size(), 4U);
-  EXPECT_GE(figures->accepted, 3U);
-  ExpectWithinBars(*figures);
+  ExpectPosed(*set, 4, 3);
 }
 
 TEST(RealSets, TheAppleIsPosedWithItsBoardAngles) {
   const auto set = LoadApple(kData / "apple_aruco_board", {});
   if (!set) GTEST_SKIP() << "the data folder is not here";
-  const auto trial = RunHullTrial(*set, {.hull_of_all = false, .most_posed = 6});
-  ASSERT_TRUE(trial) << ToString(trial.error());
-  const auto figures = FiguresOf(*trial);
-  ASSERT_TRUE(figures) << ToString(figures.error());
-  EXPECT_EQ(figures->rotation_deg.size(), 6U);
-  EXPECT_EQ(figures->accepted, 6U);
-  ExpectWithinBars(*figures);
+  ExpectPosed(*set, 6, 6);
 }
 
 }  // namespace

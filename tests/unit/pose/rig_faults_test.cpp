@@ -183,11 +183,17 @@ TEST(RigFaults, LostStepsWhereThePlansOrderIsNotThatOfCapture) {
   ExpectNotSpread(outcome, WithoutFault());
 }
 
-TEST(RigFaults, TheSpecimenIsBumpedBetweenTwoViews) {
+// By 2 degrees, in the views of [from, until).
+test::SceneFaults Bumped(int from, int until = test::SceneFaults().moved_until) {
   test::SceneFaults faults;
-  faults.moved_from = 12;
+  faults.moved_from = from;
+  faults.moved_until = until;
   faults.moved << RadFromDeg(2) * Eigen::Vector3d(0.6, 0.64, 0.48), 0.3, -0.2, 0.1;
-  const Outcome outcome = SolveBug(faults);
+  return faults;
+}
+
+TEST(RigFaults, TheSpecimenIsBumpedBetweenTwoViews) {
+  const Outcome outcome = SolveBug(Bumped(12));
   Print(outcome);
   ExpectOneNote(outcome, "Between views v011 and v012 the specimen moved", "turned by ", 2.0, 0.1);
   EXPECT_EQ(outcome.poses.views[11].mounting, "m0");
@@ -197,11 +203,7 @@ TEST(RigFaults, TheSpecimenIsBumpedBetweenTwoViews) {
 
 // Each change is told against the views before it, whichever was found first.
 TEST(RigFaults, TheSpecimenIsBumpedAndBumpedBack) {
-  test::SceneFaults faults;
-  faults.moved_from = 9;
-  faults.moved_until = 18;
-  faults.moved << RadFromDeg(2) * Eigen::Vector3d(0.6, 0.64, 0.48), 0.3, -0.2, 0.1;
-  const Outcome outcome = SolveBug(faults);
+  const Outcome outcome = SolveBug(Bumped(9, 18));
   Print(outcome);
   ASSERT_EQ(outcome.poses.notes.size(), 2u);
   for (const std::string words : {"Between views v008 and v009 the specimen moved",
@@ -213,11 +215,7 @@ TEST(RigFaults, TheSpecimenIsBumpedAndBumpedBack) {
 }
 
 TEST(RigFaults, OneViewAloneIsOff) {
-  test::SceneFaults faults;
-  faults.moved_from = 5;
-  faults.moved_until = 6;
-  faults.moved << RadFromDeg(2) * Eigen::Vector3d(0.6, 0.64, 0.48), 0.3, -0.2, 0.1;
-  const Outcome outcome = SolveBug(faults);
+  const Outcome outcome = SolveBug(Bumped(5, 6));
   Print(outcome, {5});
   EXPECT_EQ(outcome.Notes(), "");
   EXPECT_TRUE(Says(outcome.poses.views[5].reason, "this view alone"));
