@@ -190,10 +190,16 @@ std::vector<ViewCandidate> ViewSearch::Solve(const PhotoContour& photo, const In
       to.push_back(pose);
   };
 
+  // With the coarse mesh right poses of beetle and orchid are 0.5 to 1.8 px off and wrong ones at
+  // least 3 times as much, from 5 px on (Fig 12 and bench_pose_speed): the full mesh costs ten
+  // times as much, and such a distance it does not make good.
+  const auto hopeless = [&](const ViewCandidate& c, const ViewCandidate& best) {
+    return c.misfit > 3 * best.misfit + 2 * unit;
+  };
   std::vector<CameraFromModel> starts;
-  for (const ViewCandidate& c :
-       refined(coarse_, Search(photo, in, distance_mm), rough, 40 * unit)) {
-    if (static_cast<int>(starts.size()) >= options_.finalists) break;
+  const auto found = refined(coarse_, Search(photo, in, distance_mm), rough, 40 * unit);
+  for (const ViewCandidate& c : found) {
+    if (static_cast<int>(starts.size()) >= options_.finalists || hopeless(c, found.front())) break;
     add(starts, c.camera_from_model);
   }
   // Twins of all finalists, as many again kept.
@@ -202,7 +208,7 @@ std::vector<ViewCandidate> ViewSearch::Solve(const PhotoContour& photo, const In
     for (const CameraFromModel& twin : TwinsOf(photo, in, pose)) twins.push_back(twin);
   int kept = 0;
   for (const ViewCandidate& c : refined(coarse_, twins, rough, 40 * unit)) {
-    if (kept++ >= options_.finalists) break;
+    if (kept++ >= options_.finalists || hopeless(c, found.front())) break;
     add(starts, c.camera_from_model);
   }
   if (starts.empty() || stop.stop_requested()) return {};
