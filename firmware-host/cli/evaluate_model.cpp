@@ -16,6 +16,11 @@ std::string Row(const char* name, const Spread& s) {
   return fmt::format("  {:<40} {:8.3f} {:8.3f} {:8.3f}\n", name, s.median, s.p95, s.max);
 }
 
+std::string Rows(const char* name, const OutlineDistances& d) {
+  return Row(name, d.px) +
+         Row(fmt::format("  less the {:+.3f} px common to all", d.swell_px).c_str(), d.even_px);
+}
+
 CommandOutput OutputOf(const CalibratedFigures& f) {
   CommandOutput output;
   Json lens = Json::array();
@@ -37,14 +42,18 @@ CommandOutput OutputOf(const CalibratedFigures& f) {
                  {"rotation_after_alignment_deg", ToJson(f.aligned_deg)},
                  {"axis_deg", f.axis_deg ? Json(*f.axis_deg) : Json()},
                  {"lens", lens},
-                 {"contour_px", ToJson(f.contour_px)},
-                 {"contour_calibrated_px", ToJson(f.contour_calibrated_px)}};
+                 {"contour_px", ToJson(f.contour.px)},
+                 {"contour_swell_px", f.contour.swell_px},
+                 {"contour_even_px", ToJson(f.contour.even_px)},
+                 {"contour_calibrated_px", ToJson(f.contour_calibrated.px)},
+                 {"contour_calibrated_swell_px", f.contour_calibrated.swell_px},
+                 {"contour_calibrated_even_px", ToJson(f.contour_calibrated.even_px)}};
   output.text = fmt::format("{} of {} views accepted\n{:<42} {:>8} {:>8} {:>8}\n", f.accepted,
                             f.views, "", "median", "p95", "max") +
                 Row("rotation between neighbours, deg", f.neighbour_deg) +
                 Row("rotation after one alignment, deg", f.aligned_deg) +
-                Row("mesh's outline to the photograph's, px", f.contour_px) +
-                Row("the same at the calibrated poses, px", f.contour_calibrated_px);
+                Rows("mesh's outline to the photograph's, px", f.contour) +
+                Rows("the same at the calibrated poses, px", f.contour_calibrated);
   if (f.axis_deg)
     output.text +=
         fmt::format("  turntable axis against the calibrated one {:.3f} deg\n", *f.axis_deg);

@@ -45,28 +45,38 @@ Eigen::Vector3d AxisOf(const std::vector<Pair>& pairs) {
   return axis.normalized();
 }
 
-std::vector<double> ContourDistances(const ContourMesh& mesh, const PhotoContour& photo,
-                                     const PoseOf& pose) {
+std::vector<double> SignedDistances(const ContourMesh& mesh, const PhotoContour& photo,
+                                    const PoseOf& pose) {
   const auto samples =
       FindContourSamples(mesh, pose.camera_from_model, pose.intrinsics, kSpacingPx);
   const MatchResult match = MatchContour(samples, photo, 0, kWindowPx);
   std::vector<double> distances;
-  for (const ContourMatch& m : match.matches) distances.push_back(std::abs(m.residual_px));
+  for (const ContourMatch& m : match.matches) distances.push_back(m.residual_px);
   distances.insert(distances.end(), static_cast<std::size_t>(match.unmatched_px / kSpacingPx),
                    kWindowPx);
   return distances;
 }
 
-// Of all outlines together.
-Spread PooledDistances(const ContourMesh& mesh, std::span<const Mask> masks,
-                       const std::vector<std::optional<PoseOf>>& poses) {
+OutlineDistances PooledDistances(const ContourMesh& mesh, std::span<const Mask> masks,
+                                 const std::vector<std::optional<PoseOf>>& poses) {
   std::vector<std::vector<double>> each(masks.size());
   tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t i) {
-    if (poses[i]) each[i] = ContourDistances(mesh, MakePhotoContour(masks[i]), *poses[i]);
+    if (poses[i]) each[i] = SignedDistances(mesh, MakePhotoContour(masks[i]), *poses[i]);
   });
   std::vector<double> all;
   for (const auto& distances : each) all.insert(all.end(), distances.begin(), distances.end());
-  return SpreadOf(std::move(all));
+  OutlineDistances pooled;
+  pooled.swell_px = SpreadOf(all).median;
+  std::vector<double> even;
+  for (double& distance : all) {
+    // A piece without a partner is not brought nearer.
+    const bool alone = distance == kWindowPx;
+    even.push_back(alone ? kWindowPx : std::abs(distance - pooled.swell_px));
+    distance = std::abs(distance);
+  }
+  pooled.px = SpreadOf(std::move(all));
+  pooled.even_px = SpreadOf(std::move(even));
+  return pooled;
 }
 
 std::vector<MovedParameter> MovedLens(const Poses& poses, const PhotoSet& photos,
@@ -160,8 +170,8 @@ Result<CalibratedFigures> CompareWithCalibrated(const Poses& poses, const Calibr
   }
   figures.lens = MovedLens(poses, photos, truth.intrinsics);
   const ContourMesh contour_mesh(mesh);
-  figures.contour_px = PooledDistances(contour_mesh, masks, solved);
-  figures.contour_calibrated_px = PooledDistances(contour_mesh, masks, calibrated);
+  figures.contour = PooledDistances(contour_mesh, masks, solved);
+  figures.contour_calibrated = PooledDistances(contour_mesh, masks, calibrated);
   return figures;
 }
 

@@ -34,6 +34,13 @@ struct MovedParameter {
   double truth = 0;  // calibrated less nominal, same unit
 };
 
+// Of the mesh's outline to the photograph's, all views together.
+struct OutlineDistances {
+  Spread px;            // its size
+  double swell_px = 0;  // its median, the photograph's outline outside is positive
+  Spread even_px;       // its size less that median: masks cut too wide or too narrow all round
+};
+
 struct CalibratedFigures {
   std::size_t views = 0, accepted = 0;
   Spread neighbour_deg;            // rotation between neighbours, solved against calibrated
@@ -41,9 +48,9 @@ struct CalibratedFigures {
   std::optional<double> axis_deg;  // solved against calibrated turntable axis, camera frame; only
                                    // with one aim
   std::vector<MovedParameter> lens;
-  Spread contour_px;             // |distance| of the mesh's outline to the photograph's
-  Spread contour_calibrated_px;  // the same at the calibrated poses; means something only where
-                                 // their model frame is the mesh's
+  OutlineDistances contour;
+  OutlineDistances contour_calibrated;  // at the calibrated poses; means something only where their
+                                        // model frame is the mesh's
 };
 
 // Accepted views that `truth` names are compared, in the order of `photos`. Contour distances are

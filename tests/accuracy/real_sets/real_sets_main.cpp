@@ -27,8 +27,8 @@ Status Run(const std::string& name, const RealSet& set, const HullTrialOptions& 
       name, set.whole.size(), whole, trial.hull_views, trial.hull.faces.size(), trial.hull_seconds,
       trial.posed.truth.size(), figures.accepted, trial.solve_seconds);
   const CalibratedFigures& c = figures.calibrated;
-  PrintSpread("hull's outline to the photograph's", c.contour_px, "px");
-  PrintSpread("the same at the calibrated cameras", c.contour_calibrated_px, "px");
+  PrintSpread("hull's outline to the photograph's", c.contour.px, "px");
+  PrintSpread("the same at the calibrated cameras", c.contour_calibrated.px, "px");
   if (!figures.nominal_deg.empty())
     PrintSpread("nominal rotation against the calibrated", SpreadOf(figures.nominal_deg), "deg");
   PrintSpread("rotation against the calibrated camera", SpreadOf(figures.rotation_deg), "deg");

@@ -16,7 +16,7 @@ void ExpectPosed(const RealSet& set, std::size_t views, std::size_t least_accept
   ASSERT_TRUE(figures) << ToString(figures.error());
   EXPECT_EQ(figures->rotation_deg.size(), views);
   EXPECT_GE(figures->accepted, least_accepted);
-  EXPECT_LT(figures->calibrated.contour_px.median, 1.5);
+  EXPECT_LT(figures->calibrated.contour.px.median, 1.5);
   EXPECT_LT(SpreadOf(figures->rotation_deg).max, 3);
 }
 

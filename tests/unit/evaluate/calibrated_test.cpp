@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "drivers/base/files.h"
 #include "drivers/base/units.h"
 #include "pose_scene.h"
@@ -58,8 +60,8 @@ TEST(CompareWithCalibrated, TheSameCamerasAgree) {
   EXPECT_LT(figures->neighbour_deg.max, 1e-5);
   ASSERT_TRUE(figures->axis_deg);
   EXPECT_LT(*figures->axis_deg, 1e-5);
-  EXPECT_LT(figures->contour_px.median, 0.3);
-  EXPECT_EQ(figures->contour_px.median, figures->contour_calibrated_px.median);
+  EXPECT_LT(figures->contour.px.median, 0.3);
+  EXPECT_EQ(figures->contour.px.median, figures->contour_calibrated.px.median);
 }
 
 TEST(CompareWithCalibrated, RotationsDoNotDependOnTheCalibrationsOwnFrame) {
@@ -89,6 +91,18 @@ TEST(CompareWithCalibrated, ErrorsComeOutInTheirUnits) {
   EXPECT_NEAR(*figures->axis_deg, 2, 1e-5);
 }
 
+TEST(CompareWithCalibrated, MasksCutTooWideAreToldFromPosesThatAreOff) {
+  CalibratedCase c = MakeCalibratedCase();
+  for (Mask& mask : c.scene.masks) cv::dilate(mask.coverage, mask.coverage, {});
+  // By a pixel along rows and columns, by its diagonal else.
+  const auto figures = c.Compare();
+  ASSERT_TRUE(figures) << ToString(figures.error());
+  EXPECT_GT(figures->contour.swell_px, 0.95);
+  EXPECT_LT(figures->contour.swell_px, 1.45);
+  EXPECT_GT(figures->contour.px.median, 0.95);
+  EXPECT_LT(figures->contour.even_px.median, 0.3);
+}
+
 TEST(CompareWithCalibrated, AShiftedModelMovesItsOutline) {
   CalibratedCase c = MakeCalibratedCase();
   // 0.5 mm to the right at about 550 mm: 1.25 px.
@@ -98,9 +112,9 @@ TEST(CompareWithCalibrated, AShiftedModelMovesItsOutline) {
                         view.camera_from_model.translation() + Eigen::Vector3d(0.5, 0, 0));
   const auto figures = c.Compare();
   ASSERT_TRUE(figures) << ToString(figures.error());
-  EXPECT_GT(figures->contour_px.median, 0.4);
-  EXPECT_LT(figures->contour_px.median, 1.3);
-  EXPECT_LT(figures->contour_calibrated_px.median, 0.3);
+  EXPECT_GT(figures->contour.px.median, 0.4);
+  EXPECT_LT(figures->contour.px.median, 1.3);
+  EXPECT_LT(figures->contour_calibrated.px.median, 0.3);
 }
 
 TEST(CompareWithCalibrated, LensParametersBesideTheNominalAndTheCalibrated) {
