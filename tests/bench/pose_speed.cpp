@@ -1,14 +1,13 @@
 // How long the joint solve takes, and how much memory: photographs of 3696 x 2448 against a fine
 // mesh.
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <fstream>
 #include <string>
 
+#include "clocks.h"
 #include "pose_scene.h"
 #include "reconstruction/evaluate/turntable_trial.h"
 #include "reconstruction/pose/contour_sample.h"
@@ -21,21 +20,10 @@ namespace {
 
 struct SpeedOptions {
   std::string specimen = "beetle";
-  int views = 25;
+  std::vector<int> views{25};
   int width = 3696;
   double edge_mm = 0.065;  // of the beetle: 500 thousand faces
 };
-
-double Seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double ProcessorSeconds() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
 
 // The kernel's figure for the peak since the last ForgetPeak.
 double PeakMib() {
@@ -46,14 +34,14 @@ double PeakMib() {
 }
 void ForgetPeak() { std::ofstream("/proc/self/clear_refs") << 5; }
 
-PoseTrial MakeTrial(const SpeedOptions& options) {
+PoseTrial MakeTrial(const SpeedOptions& options, int views) {
   const auto specimen = MakeSpecimen(options.specimen).value();
   PoseTrial trial;
   trial.mesh = ExactSurface(*specimen, options.edge_mm);
   test::SceneOptions scene_options;
   scene_options.w = 462;  // its masks are not used
   scene_options.h = 306;
-  scene_options.views = options.views;
+  scene_options.views = views;
   scene_options.static_errors = true;
   const TableFromModel placing(ExpSo3({0.02, -0.03, 0.7}), Eigen::Vector3d(0.5, -1, 14));
   const test::Scene scene = test::MakeScene(ExactSurface(*specimen, 1), placing, scene_options);
@@ -66,45 +54,51 @@ PoseTrial MakeTrial(const SpeedOptions& options) {
   return trial;
 }
 
-void Measure(const PoseTrial& trial, bool no_priors, const char* name) {
+// Returns the seconds of processor.
+double Measure(const PoseTrial& trial, bool no_priors, const char* name) {
   JointOptions joint;
   joint.no_priors = no_priors;
   ForgetPeak();
-  const double start = Seconds(), processor = ProcessorSeconds();
+  const double start = bench::Seconds(), processor = bench::ProcessorSeconds(),
+               stolen = bench::StolenSeconds();
   const auto poses = SolveJoint(trial.mesh, trial.photos, trial.masks, joint);
-  const double seconds = Seconds() - start, used = ProcessorSeconds() - processor;
+  const double seconds = bench::Seconds() - start, used = bench::ProcessorSeconds() - processor,
+               taken = bench::StolenSeconds() - stolen;
   const double peak = PeakMib();
   if (!poses) {
     fmt::print("{}: {}\n", name, ToString(poses.error()));
-    return;
+    return used;
   }
   const MethodSummary s = Summarise(ScorePoses(trial, *poses, poses->free_directions), 5);
   fmt::print(
-      "{:<14} {:6.2f} s  ({:6.2f} s of processor)  peak {:5.0f} MiB  accepted {} of {}  "
-      "surface {:.3f} px median, {:.3f} max\n",
-      name, seconds, used, peak, s.accepted, s.views, s.surface_px.median, s.surface_px.max);
+      "{:<14} {:6.2f} s  ({:6.2f} s of processor, {:.2f} s taken by the host)  peak {:5.0f} MiB  "
+      "accepted {} of {}  surface {:.3f} px median, {:.3f} max\n",
+      name, seconds, used, taken, peak, s.accepted, s.views, s.surface_px.median, s.surface_px.max);
+  return used;
 }
 
 // One outline, this way and by the depth and id buffers of the renderer.
 void MeasureOutline(const PoseTrial& trial) {
   constexpr int kRounds = 10;
-  double start = Seconds();
+  double start = bench::Seconds(), processor = bench::ProcessorSeconds();
   const ContourMesh mesh(trial.mesh);
-  fmt::print("mesh prepared in {:.2f} s\n", Seconds() - start);
+  const ViewSearch templates(mesh, trial.photos.approx_distance_mm.value_or(0), {}, {});
+  fmt::print("mesh and templates of all views prepared in {:.2f} s ({:.2f} s of processor)\n",
+             bench::Seconds() - start, bench::ProcessorSeconds() - processor);
   const auto views = std::min<std::size_t>(trial.truth.size(), kRounds);
   double quick = 0, plain = 0;
   std::size_t samples = 0, segments = 0;
   for (std::size_t i = 0; i < views; ++i) {
     const PoseOf& view = trial.truth[i];
-    start = Seconds();
+    start = bench::Seconds();
     samples += FindContourSamples(mesh, view.camera_from_model, view.intrinsics, 4).size();
-    quick += Seconds() - start;
-    start = Seconds();
+    quick += bench::Seconds() - start;
+    start = bench::Seconds();
     const Raster raster = Rasterise(trial.mesh, view.camera_from_model, view.intrinsics);
     segments +=
         ContourGenerators(trial.mesh, mesh.edges, view.camera_from_model, view.intrinsics, raster)
             .size();
-    plain += Seconds() - start;
+    plain += bench::Seconds() - start;
   }
   fmt::print(
       "outline of a view: {:.1f} ms on one core; by depth buffer and contour generators {:.1f} ms "
@@ -121,7 +115,9 @@ int main(int argc, char** argv) {
   app.add_option("--specimen", options.specimen)
       ->check(CLI::IsMember(scan::SpecimenNames()))
       ->capture_default_str();
-  app.add_option("--views", options.views)->check(CLI::Range(2, 1000))->capture_default_str();
+  app.add_option("--views", options.views, "photographs; several counts: what an added one costs")
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
   app.add_option("--width", options.width, "of the photographs, px")
       ->check(CLI::Range(200, 8000))
       ->capture_default_str();
@@ -129,11 +125,23 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.05, 5.0))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const scan::PoseTrial trial = scan::MakeTrial(options);
-  fmt::print("{}: {} photographs of {} x {}, mesh of {} faces\n", options.specimen,
-             trial.masks.size(), trial.masks.front().coverage.cols,
-             trial.masks.front().coverage.rows, trial.mesh.faces.size());
-  scan::MeasureOutline(trial);
-  scan::Measure(trial, false, "logged poses");
-  scan::Measure(trial, true, "no poses");
+  std::sort(options.views.begin(), options.views.end());
+  int before = 0;
+  double logged_before = 0, alone_before = 0;
+  for (const int views : options.views) {
+    const scan::PoseTrial trial = scan::MakeTrial(options, views);
+    fmt::print("{}: {} photographs of {} x {}, mesh of {} faces\n", options.specimen, views,
+               trial.masks.front().coverage.cols, trial.masks.front().coverage.rows,
+               trial.mesh.faces.size());
+    if (before == 0) scan::MeasureOutline(trial);
+    const double logged = scan::Measure(trial, false, "logged poses");
+    const double alone = scan::Measure(trial, true, "no poses");
+    if (before > 0 && views > before)
+      fmt::print("an added photograph: {:.2f} s of processor with logged poses, {:.2f} s without\n",
+                 (logged - logged_before) / (views - before),
+                 (alone - alone_before) / (views - before));
+    before = views;
+    logged_before = logged;
+    alone_before = alone;
+  }
 }

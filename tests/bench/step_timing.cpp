@@ -13,10 +13,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <fstream>
 #include <thread>
 #include <vector>
 
+#include "clocks.h"
 #include "drivers/base/log.h"
 #include "drivers/io/gpio/sim_gpio_board.h"
 #include "drivers/motion/gpio/gpio_motion.h"
@@ -192,17 +192,6 @@ void RunBare(const Options& options, std::int64_t work_ns, Notes& notes) {
   }).join();
 }
 
-// What a host has taken from this virtual machine since it was started; 0 on a real one.
-double StolenMs() {
-  std::ifstream file("/proc/stat");
-  std::string cpu;
-  double user, nice, system, idle, wait, irq, soft_irq, stolen;
-  if (!(file >> cpu >> user >> nice >> system >> idle >> wait >> irq >> soft_irq >> stolen)) {
-    return 0;
-  }
-  return 1e3 * stolen / static_cast<double>(::sysconf(_SC_CLK_TCK));
-}
-
 // Programs that keep every core busy, for as long as this and the thread that made it live.
 class Burners {
  public:
@@ -240,7 +229,7 @@ Status Measure(const Options& options, Player& player, const char* load) {
   Notes player_all, bare_all;
   std::vector<double> ratios;
   std::int64_t player_cpu_ns = 0, bare_cpu_ns = 0, player_ns = 0, bare_ns = 0;
-  const double stolen_ms = StolenMs();
+  const double stolen_ms = 1e3 * bench::StolenSeconds();
   for (int k = 0; k < options.pairs; ++k) {
     Notes played, bare;
     const auto steps = static_cast<std::size_t>(options.rate * options.seconds) + 100;
@@ -280,7 +269,8 @@ Status Measure(const Options& options, Player& player, const char* load) {
   fmt::print("  processor time: player {:.1f} %, loop {:.1f} %\n",
              percent(player_cpu_ns, player_ns), percent(bare_cpu_ns, bare_ns));
   fmt::print("  taken from the processors by the host of this machine: {:.0f} ms in {:.1f} s\n",
-             StolenMs() - stolen_ms, 1e-9 * static_cast<double>(player_ns + bare_ns));
+             1e3 * bench::StolenSeconds() - stolen_ms,
+             1e-9 * static_cast<double>(player_ns + bare_ns));
   std::fflush(stdout);
   return {};
 }
