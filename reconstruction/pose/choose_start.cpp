@@ -6,12 +6,14 @@
 #include <cmath>
 
 #include "reconstruction/pose/acceptance.h"
+#include "reconstruction/pose/rigid_motion.h"
 
 namespace scan {
 namespace {
 
 constexpr int kViews = 8;  // that compare candidates
-constexpr int kFinal = 3;  // candidates compared with the full mesh
+constexpr int kFinal = 3;  // candidates compared with the full mesh, of which no two turned by less
+constexpr double kSame_rad = 0.03;
 
 // At most `count` of the views in use, evenly spread.
 std::vector<bool> Spread(const std::vector<bool>& use, int count) {
@@ -93,14 +95,22 @@ Result<std::vector<ChosenStart>> ChooseStarts(const ContourMesh& mesh, RigModel&
     std::stable_sort(refined.begin(), refined.end(), [](const Refined& a, const Refined& b) {
       return a.distance_px < b.distance_px;
     });
+    // Many starts end at the same placing.
+    std::vector<Refined> distinct;
+    for (const Refined& r : refined)
+      if (std::none_of(distinct.begin(), distinct.end(), [&](const Refined& d) {
+            return AngleBetween(d.table_from_model.rotation(), r.table_from_model.rotation()) <
+                   kSame_rad;
+          }))
+        distinct.push_back(r);
     RefineOptions fine = refine;
     fine.first_window_px = 24 * unit;
     fine.max_iterations = 8;
     fine.converged_px = 0.1 * unit;
     Refined best;
-    for (int k = 0; k < std::min(kFinal, static_cast<int>(refined.size())); ++k) {
-      if (k > 0 && refined[k].distance_px > 2 * refined[0].distance_px + unit) break;
-      const Refined full = RefineFrom(mesh, rig, mounting, refined[k].table_from_model, photos,
+    for (int k = 0; k < std::min(kFinal, static_cast<int>(distinct.size())); ++k) {
+      if (k > 0 && distinct[k].distance_px > 2 * distinct[0].distance_px + unit) break;
+      const Refined full = RefineFrom(mesh, rig, mounting, distinct[k].table_from_model, photos,
                                       some, fine, 12 * unit, stop);
       if (stop.stop_requested()) return Cancelled("pose");
       if (k == 0 || full.distance_px < best.distance_px) best = full;
