@@ -11,5 +11,6 @@ std::unique_ptr<Specimen> MakeBeetle();
 std::unique_ptr<Specimen> MakeOrchid();
 std::unique_ptr<Specimen> MakeMushroom();
 std::unique_ptr<Specimen> MakeTomato(bool bent_stalk);
+std::unique_ptr<Specimen> MakeFlushedTomato();
 
 }  // namespace scan::specimens

@@ -8,7 +8,7 @@
 namespace scan {
 
 std::vector<std::string> SpecimenNames() {
-  return {"beetle", "orchid", "mushroom", "tomato", "tomato-stalk"};
+  return {"beetle", "orchid", "mushroom", "tomato", "tomato-flushed", "tomato-stalk"};
 }
 
 Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name) {
@@ -16,6 +16,7 @@ Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name) {
   if (name == "orchid") return specimens::MakeOrchid();
   if (name == "mushroom") return specimens::MakeMushroom();
   if (name == "tomato") return specimens::MakeTomato(false);
+  if (name == "tomato-flushed") return specimens::MakeFlushedTomato();
   if (name == "tomato-stalk") return specimens::MakeTomato(true);
   return BadInput(fmt::format("unknown specimen '{}'", name), "specimen",
                   fmt::format("choose one of {}", fmt::join(SpecimenNames(), ", ")));

@@ -28,7 +28,8 @@ class Specimen {
   virtual BoundingBox Bounds() const = 0;
 };
 
-// beetle, orchid, mushroom, tomato (an exact body of revolution), tomato-stalk (bent stalk).
+// beetle, orchid, mushroom, tomato (an exact body of revolution), tomato-flushed (the same, its
+// colour following the density under its skin), tomato-stalk (bent stalk).
 std::vector<std::string> SpecimenNames();
 // Errors: bad_input for an unknown name.
 Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name);
