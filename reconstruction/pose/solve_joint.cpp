@@ -157,6 +157,7 @@ Poses Describe(const ContourMesh& mesh, const PhotoSet& photos, std::span<const 
     const Intrinsics intrinsics = rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens);
     const EvidenceMatrix covariance = ViewCovariance(rig, posterior, fit.parameters, index);
     view.covariance = covariance.topLeftCorner<6, 6>();
+    view.covariance_with_lens = covariance;
     view.surface_sigma_px = SurfaceSigmaOf(mesh, view.camera_from_model, intrinsics, covariance);
     const ReducedPicture picture = ReducePicture(masks[i], intrinsics);
     if (picture.empty()) return;
