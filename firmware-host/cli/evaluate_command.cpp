@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include "drivers/base/staged_folder.h"
 #include "drivers/base/units.h"
@@ -48,6 +50,7 @@ struct EvaluateOptions {
   EvaluateModelOptions model;
   PaperOptions paper;
   JointOptions joint;
+  AppearanceOptions appearance;
 
   bool is_fig12() const { return preset == "fig12"; }
   bool was_captured() const { return !is_fig12() && !from.empty(); }
@@ -103,70 +106,6 @@ Json ToJson(const MethodFigures& figures, double wrong_px) {
           {"per_view", views}};
 }
 
-// Joint first: what it reports free is taken off for both.
-Result<std::vector<MethodFigures>> RunMethods(const PoseTrial& trial,
-                                              const EvaluateOptions& options,
-                                              const CliContext& context) {
-  std::vector<MethodFigures> methods;
-  std::vector<FreeDirection> free;
-  const auto score = [&](const Result<Poses>& poses, double seconds) -> Status {
-    if (!poses) return tl::unexpected<Error>(poses.error());
-    if (poses->method == "joint") free = poses->free_directions;
-    methods.push_back(ScorePoses(trial, *poses, free));
-    methods.back().seconds = seconds;
-    return {};
-  };
-  auto start = std::chrono::steady_clock::now();
-  if (options.with_joint()) {
-    const auto poses = options.is_fig12()
-                           ? SolveEachAlone(trial, options.joint, context.progress, context.stop)
-                           : SolveJoint(trial.mesh, trial.photos, trial.masks, options.joint,
-                                        context.progress, context.stop);
-    SCAN_CHECK(score(poses, SecondsSince(start)));
-  }
-  start = std::chrono::steady_clock::now();
-  if (options.with_paper()) {
-    TriangleMesh mesh = trial.mesh;
-    if (options.paper_faces > 0) {
-      SCAN_TRY(Decimation fewer, Decimate(mesh, {.faces = options.paper_faces}));
-      mesh = std::move(fewer.mesh);
-    }
-    const auto poses =
-        SolvePaper(mesh, trial.photos, trial.masks, options.paper, context.progress, context.stop);
-    SCAN_CHECK(score(poses, SecondsSince(start)));
-  }
-  return methods;
-}
-
-// A folder that `scanstation demo` or `evaluate poses --out` wrote, its truth beside the session.
-Result<PoseTrial> TrialOf(const DemoPaths& paths, const EvaluateOptions& options,
-                          const CliContext& context) {
-  PoseTrial trial;
-  SCAN_TRY(trial.photos, LoadPhotoSet(paths.session));
-  SCAN_TRY(trial.truth, ReadTruth(paths.truth, paths.session, trial.photos));
-  const auto indices =
-      EvenlySpread(trial.photos.photos.size(), options.views > 0 ? options.views : 24);
-  trial.masks.resize(trial.photos.photos.size());
-  trial = Subset(trial, indices);
-  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
-  trial.surface = ExactSurface(*specimen, 0.3);
-  TurntableErrors errors;
-  errors.w = options.photo_width();
-  errors.focal_error_rel = options.focal_error_percent / 100;
-  errors.turntable_sigma_rad = RadFromDeg(options.logged_sigma_deg);
-  errors.lift_sigma_mm = options.logged_sigma_mm;
-  StateErrors(trial, errors);
-  if (options.draws_masks()) {
-    DrawMasks(trial, {.noise = options.fig12.noise, .seed = options.fig12.seed});
-  } else {
-    SCAN_TRY(trial.masks, MakeMasks(trial.photos, {}, context.progress, context.stop));
-  }
-  SCAN_TRY(const Volume volume, ReadVolume(paths.volume, {}));
-  SCAN_TRY(SurfaceResult surface, ExtractSurface(volume, {}, context.progress, context.stop));
-  trial.mesh = std::move(surface.mesh);
-  return trial;
-}
-
 // A folder of its own that is removed at the end.
 class ScratchFolder {
  public:
@@ -191,12 +130,128 @@ class ScratchFolder {
   fs::path path_;
 };
 
-Result<PoseTrial> CapturedTrial(const fs::path& folder, const EvaluateOptions& options,
-                                const CliContext& context) {
+// Photographs with known cameras, and what else colour needs of them.
+struct Capture {
+  PoseTrial trial;
+  std::optional<Volume> volume;
+  std::shared_ptr<const ScratchFolder> scratch;  // where the photographs lie, if nobody keeps them
+};
+
+struct Evaluation {
+  std::vector<MethodFigures> methods;
+  Json turns = Json::array();  // free by the silhouettes: what colour made of them
+  std::string text;
+};
+
+// What of each turn that the silhouettes left free is wrong after colour had its say.
+void DescribeTurns(const PoseTrial& trial, const Poses& poses, std::span<const FreeDirection> free,
+                   Evaluation& evaluation) {
+  for (const FreeDirection& turn : free) {
+    if (turn.kind != FreeDirection::Kind::rotation) continue;
+    const std::vector<double> errors = TurnErrors(trial, poses, turn);
+    if (errors.empty()) continue;
+    double largest = 0, spread = 0;
+    for (const double error : errors) {
+      largest = std::max(largest, std::abs(error));
+      spread = std::max(spread, std::abs(std::remainder(error - errors.front(), 2 * kPi)));
+    }
+    const bool decided = poses.free_directions.size() < free.size();
+    evaluation.turns.push_back({{"of", turn.of},
+                                {"decided_by_colour", decided},
+                                {"largest_error_deg", DegFromRad(largest)},
+                                {"largest_between_views_deg", DegFromRad(spread)}});
+    evaluation.text += fmt::format(
+        "turn about the free axis of {}: {}; largest error {:.2f} deg, between views {:.2f} deg\n",
+        turn.of, decided ? "decided by colour" : "not decided, arbitrary", DegFromRad(largest),
+        DegFromRad(spread));
+  }
+}
+
+// The joint solve, and by colour the turns that it leaves free. `free`: those.
+Result<Poses> SolveAll(const Capture& capture, const EvaluateOptions& options,
+                       const CliContext& context, std::vector<FreeDirection>& free) {
+  const PoseTrial& trial = capture.trial;
+  SCAN_TRY(Poses poses, SolveJoint(trial.mesh, trial.photos, trial.masks, options.joint,
+                                   context.progress, context.stop));
+  free = poses.free_directions;
+  // There are no photographs of another size.
+  if (options.photo_width() == 0)
+    SCAN_CHECK(DecideFreeTurns(trial.mesh, capture.volume ? &*capture.volume : nullptr,
+                               trial.photos, trial.masks, options.appearance, poses,
+                               context.progress, context.stop));
+  return poses;
+}
+
+// Joint first: what it leaves free is taken off for both.
+Result<Evaluation> RunMethods(const Capture& capture, const EvaluateOptions& options,
+                              const CliContext& context) {
+  const PoseTrial& trial = capture.trial;
+  Evaluation evaluation;
+  std::vector<FreeDirection> free;
+  const auto score = [&](const Poses& poses, std::span<const FreeDirection> taken_off,
+                         double seconds) {
+    evaluation.methods.push_back(ScorePoses(trial, poses, taken_off));
+    evaluation.methods.back().seconds = seconds;
+  };
+  auto start = std::chrono::steady_clock::now();
+  if (options.with_joint()) {
+    SCAN_TRY(const Poses poses, options.is_fig12() ? SolveEachAlone(trial, options.joint,
+                                                                    context.progress, context.stop)
+                                                   : SolveAll(capture, options, context, free));
+    score(poses, poses.free_directions, SecondsSince(start));
+    if (options.is_fig12()) free = poses.free_directions;
+    if (!options.is_fig12()) DescribeTurns(trial, poses, free, evaluation);
+  }
+  start = std::chrono::steady_clock::now();
+  if (options.with_paper()) {
+    TriangleMesh mesh = trial.mesh;
+    if (options.paper_faces > 0) {
+      SCAN_TRY(Decimation fewer, Decimate(mesh, {.faces = options.paper_faces}));
+      mesh = std::move(fewer.mesh);
+    }
+    SCAN_TRY(const Poses poses, SolvePaper(mesh, trial.photos, trial.masks, options.paper,
+                                           context.progress, context.stop));
+    score(poses, free, SecondsSince(start));
+  }
+  return evaluation;
+}
+
+// A folder that `scanstation demo` or `evaluate poses --out` wrote, its truth beside the session.
+Result<Capture> CaptureIn(const DemoPaths& paths, const EvaluateOptions& options,
+                          const CliContext& context) {
+  Capture capture;
+  PoseTrial& trial = capture.trial;
+  SCAN_TRY(trial.photos, LoadPhotoSet(paths.session));
+  SCAN_TRY(trial.truth, ReadTruth(paths.truth, paths.session, trial.photos));
+  const auto indices =
+      EvenlySpread(trial.photos.photos.size(), options.views > 0 ? options.views : 24);
+  trial.masks.resize(trial.photos.photos.size());
+  trial = Subset(trial, indices);
+  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
+  trial.surface = ExactSurface(*specimen, 0.3);
+  TurntableErrors errors;
+  errors.w = options.photo_width();
+  errors.focal_error_rel = options.focal_error_percent / 100;
+  errors.turntable_sigma_rad = RadFromDeg(options.logged_sigma_deg);
+  errors.lift_sigma_mm = options.logged_sigma_mm;
+  StateErrors(trial, errors);
+  if (options.draws_masks()) {
+    DrawMasks(trial, {.noise = options.fig12.noise, .seed = options.fig12.seed});
+  } else {
+    SCAN_TRY(trial.masks, MakeMasks(trial.photos, {}, context.progress, context.stop));
+  }
+  SCAN_TRY(capture.volume, ReadVolume(paths.volume, {}));
+  SCAN_TRY(SurfaceResult surface,
+           ExtractSurface(*capture.volume, {}, context.progress, context.stop));
+  trial.mesh = std::move(surface.mesh);
+  return capture;
+}
+
+Status CaptureInto(const fs::path& folder, const EvaluateOptions& options,
+                   const CliContext& context) {
   const DemoPaths paths = DemoPathsIn(folder);
   SCAN_CHECK(CaptureDemo(paths, options.specimen, options.errors, context));
-  SCAN_CHECK(MakeDemoCt(paths, options.specimen));
-  return TrialOf(paths, options, context);
+  return MakeDemoCt(paths, options.specimen);
 }
 
 // The paper renders its photographs from the mesh that it then searches; so does this (but for
@@ -210,17 +265,23 @@ Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
   return MakeFig12Trial(ExactSurface(*specimen, 0.35), fig12);
 }
 
-Result<PoseTrial> MakeTrial(const EvaluateOptions& options, const CliContext& context) {
-  if (options.is_fig12()) return Fig12Trial(options);
-  if (options.was_captured()) return TrialOf(DemoPathsIn(options.from), options, context);
+Result<Capture> MakeCapture(const EvaluateOptions& options, const CliContext& context) {
+  if (options.is_fig12()) {
+    SCAN_TRY(PoseTrial trial, Fig12Trial(options));
+    return Capture{std::move(trial), {}, {}};
+  }
+  if (options.was_captured()) return CaptureIn(DemoPathsIn(options.from), options, context);
   if (options.out.empty()) {
-    SCAN_TRY(const auto scratch, ScratchFolder::Create());
-    return CapturedTrial(scratch->path(), options, context);
+    SCAN_TRY(std::shared_ptr<const ScratchFolder> scratch, ScratchFolder::Create());
+    SCAN_CHECK(CaptureInto(scratch->path(), options, context));
+    SCAN_TRY(Capture capture, CaptureIn(DemoPathsIn(scratch->path()), options, context));
+    capture.scratch = scratch;
+    return capture;
   }
   SCAN_TRY(StagedFolder staged, StagedFolder::Create(options.out, options.force));
-  SCAN_TRY(PoseTrial trial, CapturedTrial(staged.path(), options, context));
+  SCAN_CHECK(CaptureInto(staged.path(), options, context));
   SCAN_CHECK(staged.Commit());
-  return trial;
+  return CaptureIn(DemoPathsIn(staged.target()), options, context);
 }
 
 // The bars of the protocol.
@@ -276,13 +337,15 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
     SCAN_TRY(const StationConfig station, LoadStationConfig(DemoPathsIn(options.from).config));
     options.specimen = station.sim.specimen;
   }
-  SCAN_TRY(const PoseTrial trial, MakeTrial(options, context));
-  SCAN_TRY(const auto methods, RunMethods(trial, options, context));
+  SCAN_TRY(const Capture capture, MakeCapture(options, context));
+  const PoseTrial& trial = capture.trial;
+  SCAN_TRY(const Evaluation evaluation, RunMethods(capture, options, context));
+  const std::vector<MethodFigures>& methods = evaluation.methods;
   Json by_method = Json::object();
   for (const MethodFigures& method : methods)
     by_method[method.method] = ToJson(method, options.wrong_px);
   std::string text = ProtocolText(options, trial);
-  text += TableOf(methods, options.wrong_px, options.per_view);
+  text += TableOf(methods, options.wrong_px, options.per_view) + evaluation.text;
   if (options.is_fig12())
     for (const MethodFigures& method : methods) text += WithinText(method);
   return CommandOutput{
@@ -292,6 +355,7 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
        {"width", trial.photos.intrinsics(trial.photos.photos.front()).w},
        {"focal_mm", options.is_fig12() ? Json(options.fig12.focal_mm) : Json()},
        {"photographs", trial.photos.photos.size()},
+       {"turns_left_free_by_silhouettes", evaluation.turns},
        {"methods", by_method}},
       text};
 }
@@ -397,6 +461,8 @@ void AddEvaluate(CommandSet& commands) {
                   "pictures; 0: as it is")
       ->check(CLI::Range(0, 100'000'000))
       ->capture_default_str();
+  command.add_flag("!--no-appearance", options->appearance.enabled,
+                   "demo: colour decides no turn that the silhouettes leave free");
   command.add_flag("--per-view", options->per_view, "one line a view");
   CLI::Option* out =
       command.add_option("--out", options->out, "keep session, truth and CT volume in this folder");

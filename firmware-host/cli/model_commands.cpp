@@ -111,6 +111,13 @@ Status WritePicture(const ModelOptions& options, const cv::Mat& picture) {
   return WriteFileDurably(options.picture, std::as_bytes(std::span(png)));
 }
 
+void AddAppearanceOptions(CLI::App& command, ModelOptions& options) {
+  command.add_flag(
+      "!--no-appearance", options.stages.appearance.enabled,
+      "leave a turn about an axis of revolution free, even where the colour of the surface that "
+      "follows the CT below it would decide it");
+}
+
 Json TopologyJson(const TopologyReport& topology) {
   return {{"closed_manifold", topology.closed_manifold()},
           {"boundary_edges", topology.boundary_edges},
@@ -331,6 +338,7 @@ void AddReconstruct(CommandSet& commands) {
   AddVolumeOptions(command, *options);
   AddAtlasOptions(command, *options);
   AddPoseOptions(command, *options);
+  AddAppearanceOptions(command, *options);
 }
 
 }  // namespace scan

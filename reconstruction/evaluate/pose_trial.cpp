@@ -37,14 +37,7 @@ bool Concerns(const FreeDirection& free, const ViewPose& view) {
 // The one angle about a free axis that most views agree on: of the views' own angles the one with
 // the least sum of differences from all others.
 double CommonTurn(const PoseTrial& trial, const Poses& poses, const FreeDirection& free) {
-  std::vector<double> angles;
-  for (std::size_t i = 0; i < poses.views.size(); ++i) {
-    const ViewPose& view = poses.views[i];
-    if (view.status != ViewStatus::accepted || !Concerns(free, view)) continue;
-    const Eigen::Matrix3d error =
-        trial.truth[i].camera_from_model.rotation().transpose() * view.camera_from_model.rotation();
-    angles.push_back(TwistAbout(free.axis.normalized(), error));
-  }
+  const std::vector<double> angles = TurnErrors(trial, poses, free);
   double best = 0, least = std::numeric_limits<double>::infinity();
   for (const double candidate : angles) {
     double sum = 0;
@@ -72,6 +65,19 @@ std::string SpreadText(const Spread& spread, int digits) {
 }
 
 }  // namespace
+
+std::vector<double> TurnErrors(const PoseTrial& trial, const Poses& poses,
+                               const FreeDirection& free) {
+  std::vector<double> angles;
+  for (std::size_t i = 0; i < poses.views.size(); ++i) {
+    const ViewPose& view = poses.views[i];
+    if (view.status != ViewStatus::accepted || !Concerns(free, view)) continue;
+    const Eigen::Matrix3d error =
+        trial.truth[i].camera_from_model.rotation().transpose() * view.camera_from_model.rotation();
+    angles.push_back(TwistAbout(free.axis.normalized(), error));
+  }
+  return angles;
+}
 
 PoseTrial Subset(const PoseTrial& trial, std::span<const std::size_t> indices) {
   PoseTrial subset;

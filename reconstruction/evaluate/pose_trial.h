@@ -59,6 +59,11 @@ struct MethodFigures {
 MethodFigures ScorePoses(const PoseTrial& trial, const Poses& poses,
                          std::span<const FreeDirection> free);
 
+// Error of the turn about a rotation's axis (model frame), rad in (-pi, pi], of every accepted view
+// that it concerns. Thread contract: pure.
+std::vector<double> TurnErrors(const PoseTrial& trial, const Poses& poses,
+                               const FreeDirection& free);
+
 // One row of the table.
 struct MethodSummary {
   std::size_t views = 0, accepted = 0;

@@ -135,10 +135,11 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
 
   SCAN_TRY(result.photos, LoadPhotoSet(request.session));
   std::optional<SurfaceResult> surface;
+  std::optional<Volume> volume;
   if (!request.volume.empty()) {
-    SCAN_TRY(const Volume volume, ReadVolume(request.volume, options.volume));
+    SCAN_TRY(volume, ReadVolume(request.volume, options.volume));
     stopwatch.Lap("read volume");
-    SCAN_TRY(surface, ExtractSurface(volume, options.surface, progress, stop));
+    SCAN_TRY(surface, ExtractSurface(*volume, options.surface, progress, stop));
     result.surface = surface->mesh;
     stopwatch.Lap("surface");
   } else {
@@ -152,6 +153,9 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
   SCAN_TRY(const std::vector<Mask> masks, MakeEvidence(result.photos, options, progress, stop));
   stopwatch.Lap("masks");
   SCAN_TRY(result.poses, SolvePoses(result.surface, result.photos, masks, options, progress, stop));
+  SCAN_CHECK(DecideFreeTurns(result.surface, volume ? &*volume : nullptr, result.photos, masks,
+                             options.appearance, result.poses, progress, stop));
+  volume.reset();  // the largest of all that is held
   result.poses.model = "surface.ply";
   SCAN_CHECK(WritePoseFiles(folder / "poses", result.poses, result.photos));
   result.views_accepted = static_cast<std::size_t>(

@@ -5,8 +5,9 @@
 //   atlas    MakeAtlas        TriangleMesh  -> AtlasMesh
 //   masks    MakeMasks        PhotoSet      -> Mask per photograph
 //   pose     SolveJoint, SolvePaper   mesh, photographs, masks -> Poses
-//   texture  MakeTexture      atlas, photographs, poses, masks -> pictures of the atlas
-//   export   WriteGlb; report WriteReport
+//   appearance DecideFreeTurns   mesh, volume, photographs, Poses -> turns that silhouettes leave
+//   free texture  MakeTexture      atlas, photographs, poses, masks -> pictures of the atlas export
+//   WriteGlb; report WriteReport
 #pragma once
 
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include "acquisition/session/photo_set.h"
 #include "drivers/base/progress.h"
 #include "drivers/base/result.h"
+#include "reconstruction/appearance/appearance.h"
 #include "reconstruction/atlas/atlas.h"
 #include "reconstruction/masks/make_masks.h"
 #include "reconstruction/pose/paper/solve_paper.h"
@@ -42,6 +44,7 @@ struct StageOptions {
   PoseMethod method = PoseMethod::joint;
   JointOptions joint;
   PaperOptions paper;
+  AppearanceOptions appearance;
   TextureOptions texture;
 };
 

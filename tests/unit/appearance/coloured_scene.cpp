@@ -20,6 +20,7 @@ ColouredScene MakeColouredScene(std::shared_ptr<const Specimen> specimen,
   if (voxel_mm > 0) {
     CtOptions ct;
     ct.voxel_mm = voxel_mm;
+    ct.supersampling = 2;
     made.volume = SynthesiseCt(*specimen, ct);
     SurfaceOptions surface_options;
     surface_options.decimate.faces = 60'000;
