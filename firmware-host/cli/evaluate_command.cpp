@@ -175,10 +175,10 @@ Result<Poses> SolveAll(const Capture& capture, const EvaluateOptions& options,
                                    context.progress, context.stop));
   free = poses.free_directions;
   // There are no photographs of another size.
-  if (options.photo_width() == 0)
-    SCAN_CHECK(DecideFreeTurns(trial.mesh, capture.volume ? &*capture.volume : nullptr,
-                               trial.photos, trial.masks, options.appearance, poses,
-                               context.progress, context.stop));
+  if (options.photo_width() > 0) return poses;
+  SCAN_CHECK(DecideFreeTurns(trial.mesh, capture.volume ? &*capture.volume : nullptr, trial.photos,
+                             trial.masks, options.appearance, poses, context.progress,
+                             context.stop));
   return poses;
 }
 

@@ -146,10 +146,14 @@ Result<AppearanceFinding> FindAppearance(const TriangleMesh& mesh, const Volume*
   return finding;
 }
 
-Status DecideFreeTurns(const TriangleMesh& mesh, const Volume* volume, const PhotoSet& photos,
-                       std::span<const Mask> masks, const AppearanceOptions& options, Poses& poses,
-                       const ProgressFn& progress, std::stop_token stop) {
-  if (!options.enabled) return {};
+Result<std::vector<AppearanceFinding>> DecideFreeTurns(const TriangleMesh& mesh,
+                                                       const Volume* volume, const PhotoSet& photos,
+                                                       std::span<const Mask> masks,
+                                                       const AppearanceOptions& options,
+                                                       Poses& poses, const ProgressFn& progress,
+                                                       std::stop_token stop) {
+  std::vector<AppearanceFinding> findings;
+  if (!options.enabled) return findings;
   const std::vector<FreeDirection> free = poses.free_directions;
   const auto is_turn = [](const FreeDirection& d) {
     return d.kind == FreeDirection::Kind::rotation && d.scope == FreeDirection::Scope::mounting;
@@ -162,12 +166,13 @@ Status DecideFreeTurns(const TriangleMesh& mesh, const Volume* volume, const Pho
     });
     if (turns > 1) continue;
     Report(progress, "appearance", 0.0);
-    SCAN_TRY(const AppearanceFinding finding,
+    SCAN_TRY(AppearanceFinding finding,
              FindAppearance(mesh, volume, photos, masks, poses, direction, options, stop));
     ApplyAppearance(mesh, photos, finding, options, poses);
+    findings.push_back(std::move(finding));
     Report(progress, "appearance", 1.0);
   }
-  return {};
+  return findings;
 }
 
 }  // namespace scan

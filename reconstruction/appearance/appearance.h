@@ -67,9 +67,11 @@ void ApplyAppearance(const TriangleMesh& mesh, const PhotoSet& photos,
                      const AppearanceFinding& finding, const AppearanceOptions& options,
                      Poses& poses);
 
-// Both, for every rotation of a mounting that is free alone. Errors and threads: as FindAppearance.
-Status DecideFreeTurns(const TriangleMesh& mesh, const Volume* volume, const PhotoSet& photos,
-                       std::span<const Mask> masks, const AppearanceOptions& options, Poses& poses,
-                       const ProgressFn& progress = {}, std::stop_token stop = {});
+// Both, for every rotation of a mounting that is free alone: what was found of each. Errors and
+// threads: as FindAppearance.
+Result<std::vector<AppearanceFinding>> DecideFreeTurns(
+    const TriangleMesh& mesh, const Volume* volume, const PhotoSet& photos,
+    std::span<const Mask> masks, const AppearanceOptions& options, Poses& poses,
+    const ProgressFn& progress = {}, std::stop_token stop = {});
 
 }  // namespace scan

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/base/staged_folder.h"
+#include "drivers/base/units.h"
 #include "reconstruction/export/glb.h"
 #include "reconstruction/mesh/mesh_io.h"
 #include "reconstruction/pose/exclude_below.h"
@@ -77,6 +78,13 @@ std::vector<Figure> MainFigures(const ReconstructResult& result, const SurfaceRe
                      "RMS along the contour, full size, median over the accepted views"});
   figures.push_back({"surface σ", fmt::format("{:.3f} px", MedianOf(sigmas)),
                      "expected reprojection error of surface points, full size, median"});
+  for (const AppearanceFinding& found : result.turns)
+    figures.push_back(
+        {"turn of " + found.direction.of,
+         found.turn.decided ? fmt::format("σ {:.2f}°", DegFromRad(found.turn.sigma_rad))
+                            : "not decided",
+         fmt::format("free by the silhouettes, judged by colour; views agree within {:.2f}°",
+                     DegFromRad(found.view_spread_rad))});
   figures.push_back({"texture measured", fmt::format("{:.1f} %", 100 * result.coverage),
                      "share of the surface's area; the rest is filled and marked so"});
   figures.push_back(
@@ -153,8 +161,8 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
   SCAN_TRY(const std::vector<Mask> masks, MakeEvidence(result.photos, options, progress, stop));
   stopwatch.Lap("masks");
   SCAN_TRY(result.poses, SolvePoses(result.surface, result.photos, masks, options, progress, stop));
-  SCAN_CHECK(DecideFreeTurns(result.surface, volume ? &*volume : nullptr, result.photos, masks,
-                             options.appearance, result.poses, progress, stop));
+  SCAN_TRY(result.turns, DecideFreeTurns(result.surface, volume ? &*volume : nullptr, result.photos,
+                                         masks, options.appearance, result.poses, progress, stop));
   volume.reset();  // the largest of all that is held
   result.poses.model = "surface.ply";
   SCAN_CHECK(WritePoseFiles(folder / "poses", result.poses, result.photos));

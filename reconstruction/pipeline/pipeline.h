@@ -63,6 +63,7 @@ struct ReconstructResult {
   PhotoSet photos;
   TriangleMesh surface;
   Poses poses;
+  std::vector<AppearanceFinding> turns;  // that silhouettes left free, judged by colour
   std::size_t views_accepted = 0;
   double coverage = 0;  // share of the surface's area that is measured
   std::vector<StageSeconds> stages;

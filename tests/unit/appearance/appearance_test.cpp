@@ -158,7 +158,7 @@ TEST(Appearance, AMissingPhotographIsNamed) {
   PhotoSet photos = s.scene.photos;
   photos.photos[2].path = s.folder->path() / "nowhere.png";
   Poses poses = test::PosesTurnedBy(s, 0, {});
-  const Status status = DecideFreeTurns(s.mesh, nullptr, photos, s.scene.masks, {}, poses);
+  const auto status = DecideFreeTurns(s.mesh, nullptr, photos, s.scene.masks, {}, poses);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().kind, ErrorKind::bad_input);
   EXPECT_NE(ToString(status.error()).find("nowhere.png"), std::string::npos);
