@@ -82,8 +82,8 @@ TEST(TurnSearch, AnyRelationCounts) {
 TEST(TurnSearch, UnrelatedFieldsDecideNothing) {
   const TurningGrid grid = Ball();
   int decided = 0;
-  for (std::uint32_t seed = 0; seed < 40; ++seed) {
-    const double wavelength_mm = 4 + 1.0 * (seed % 20);
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    const double wavelength_mm = 4.0 + seed;
     const std::vector<RingMap> features{Field(grid, wavelength_mm, 100 + seed),
                                         Field(grid, 6, 500 + seed)};
     const std::vector<RingMap> colours{Field(grid, wavelength_mm, 200 + seed),
