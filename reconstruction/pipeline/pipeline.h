@@ -1,13 +1,14 @@
 // The reconstruction in order: the table of contents of this half of the project.
 //
-//   volume   ReadVolume       file          -> Volume
-//   surface  ExtractSurface   Volume        -> TriangleMesh
-//   atlas    MakeAtlas        TriangleMesh  -> AtlasMesh
-//   masks    MakeMasks        PhotoSet      -> Mask per photograph
-//   pose     SolveJoint, SolvePaper   mesh, photographs, masks -> Poses
-//   appearance DecideFreeTurns   mesh, volume, photographs, Poses -> turns that silhouettes leave
-//   free texture  MakeTexture      atlas, photographs, poses, masks -> pictures of the atlas export
-//   WriteGlb; report WriteReport
+//   volume      ReadVolume              file                -> Volume
+//   surface     ExtractSurface          Volume              -> TriangleMesh
+//   atlas       MakeAtlas               TriangleMesh        -> AtlasMesh
+//   masks       MakeMasks               PhotoSet            -> Mask per photograph
+//   pose        SolveJoint, SolvePaper  mesh, photographs, masks -> Poses
+//   appearance  DecideFreeTurns         what silhouettes left free is decided by colour
+//   texture     MakeTexture             atlas, photographs, poses, masks -> pictures of the atlas
+//   export      WriteGlb
+//   report      WriteReport
 #pragma once
 
 #include <filesystem>
