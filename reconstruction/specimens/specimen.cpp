@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "reconstruction/specimens/beaded.h"
 #include "reconstruction/specimens/catalogue.h"
 
 namespace scan {
@@ -12,6 +13,11 @@ std::vector<std::string> SpecimenNames() {
 }
 
 Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name) {
+  constexpr std::string_view kBeads = "+beads";
+  if (name.ends_with(kBeads)) {
+    SCAN_TRY(auto bare, MakeSpecimen(name.substr(0, name.size() - kBeads.size())));
+    return WithBeads(std::move(bare));
+  }
   if (name == "beetle") return specimens::MakeBeetle();
   if (name == "orchid") return specimens::MakeOrchid();
   if (name == "mushroom") return specimens::MakeMushroom();

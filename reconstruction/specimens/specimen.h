@@ -31,7 +31,8 @@ class Specimen {
 // beetle, orchid, mushroom, tomato (an exact body of revolution), tomato-flushed (the same, its
 // colour following the density under its skin), tomato-stalk (bent stalk).
 std::vector<std::string> SpecimenNames();
-// Errors: bad_input for an unknown name.
+// Of these names, or of one followed by "+beads" (see beaded.h). Errors: bad_input for an unknown
+// name.
 Result<std::unique_ptr<Specimen>> MakeSpecimen(std::string_view name);
 
 // The exact surface as a fine mesh: vertices lie on SignedDistance = 0 to 1e-4 mm, edges about
