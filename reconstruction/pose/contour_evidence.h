@@ -12,12 +12,13 @@
 #include "drivers/base/intrinsics.h"
 #include "reconstruction/masks/contour.h"
 #include "reconstruction/masks/mask.h"
+#include "reconstruction/pose/bead_sighting.h"
 #include "reconstruction/pose/contour_grid.h"
 #include "reconstruction/pose/contour_sample.h"
 
 namespace scan {
 
-// A photograph's contour, prepared once.
+// A photograph's contour, prepared once, and the beads that were recognised in it.
 struct PhotoContour {
   ContourGrid grid;                  // every segment, flagged ones too
   std::vector<double> arc_px;        // of each segment's start, along all contours; far between two
@@ -29,6 +30,7 @@ struct PhotoContour {
   double diameter_px = 0;  // of the contour's bounding box
   bool touches_border = false;
   bool binary = false;
+  std::vector<BeadSighting> beads;
 
   bool empty() const { return points.empty(); }
 };

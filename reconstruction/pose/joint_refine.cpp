@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/pose/bead_evidence.h"
 #include "reconstruction/pose/residual_statistics.h"
 
 namespace scan {
@@ -53,6 +54,8 @@ ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewSt
   weights.sigma_px = fit.sigma_px;
   weights.correlation_px = correlation_px;
   fit.evidence = Condense(state, fit.match.matches, state.camera_from_model * mesh.centre, weights);
+  fit.beads = photo.beads;
+  AddBeads(fit.beads, *fit.evidence);
   return fit;
 }
 

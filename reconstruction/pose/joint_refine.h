@@ -33,8 +33,9 @@ inline double UnitPx(const RefineOptions& options) { return options.last_window_
 
 struct ViewFit {
   MatchResult match;
-  double sigma_px = 0;  // robust scale of the residuals, floored
-  std::optional<CondensedEvidence> evidence;
+  double sigma_px = 0;                        // robust scale of the residuals, floored
+  std::vector<BeadSighting> beads;            // of the photograph
+  std::optional<CondensedEvidence> evidence;  // of contour and beads
 };
 
 // The scale of residuals that views agree on: the median of those that took part; 0 without any.

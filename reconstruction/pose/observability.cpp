@@ -103,16 +103,17 @@ Contours ContourInformation(const ContourMesh& mesh, const SmoothNormals& smooth
       M.selfadjointView<Eigen::Lower>().rankUpdate(row, w);
       contours.faked += w * (motion.transpose() * motion - along.transpose() * along);
     }
+    for (const BeadSighting& bead : seen.beads) {
+      const Eigen::Matrix<double, 2, 6> moved =
+          PixelOf(pose, in, bead.centre) * MotionOf(bead.centre, mesh.centre);
+      M.topLeftCorner<6, 6>() += moved.transpose() * moved / (bead.sigma_px * bead.sigma_px);
+    }
   }
   M.triangularView<Eigen::StrictlyUpper>() = M.transpose();
   contours.information =
       M.topLeftCorner<6, 6>() - M.topRightCorner<6, 1>() * M.bottomLeftCorner<1, 6>() / M(6, 6);
   return contours;
 }
-
-struct Screw {
-  Eigen::Vector3d axis, point;
-};
 
 Screw ScrewOf(const Vector6d& u, const Eigen::Vector3d& centre) {
   const Eigen::Vector3d w = u.head<3>(), tau = u.tail<3>();
@@ -153,6 +154,11 @@ SmoothNormals SmoothNormalsOf(const ContourMesh& mesh, int rounds) {
   // times six count, so the noise left is the one taken away over the root of that.
   smooth.noise_rad = *middle / std::sqrt(std::max(1.0, 6.0 * rounds));
   return smooth;
+}
+
+Screw SlippageAxisOf(const ContourMesh& mesh, const SmoothNormals& smooth, const RigModel& rig,
+                     const RigParameters& parameters, std::span<const int> views) {
+  return SlippageAxis(mesh, smooth, SurfaceMotion(mesh, rig, parameters, views));
 }
 
 std::vector<FreeDirection> FreeDirectionsOf(const ContourMesh& mesh, const SmoothNormals& smooth,

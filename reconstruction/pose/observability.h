@@ -28,15 +28,25 @@ struct SmoothNormals {
 };
 SmoothNormals SmoothNormalsOf(const ContourMesh& mesh, int rounds);
 
-// The rotations, translations and scalings of the specimen of one mounting that the contours of its
-// views leave free, least determined first.
+// An axis in the model frame.
+struct Screw {
+  Eigen::Vector3d axis, point;
+};
+
+// The rotation that slides the surface along itself best (Gelfand and Guibas 2004), relative to how
+// far it moves the surface in the pictures.
+Screw SlippageAxisOf(const ContourMesh& mesh, const SmoothNormals& smooth, const RigModel& rig,
+                     const RigParameters& parameters, std::span<const int> views);
+
+// The rotations, translations and scalings of the specimen of one mounting that the contours and
+// beads of its views leave free, least determined first.
 //
 // Body motions x -> Exp(w) (x - c) + c + tau about the mass centre c move a contour point along its
 // image normal by n . (w x (p - c) + tau), n the smooth surface normal. The information of all
-// matched points, with focal length, principal point and mask bias marginalised under their priors
-// and the part that noise of the normals fakes taken off, is compared with the mean square motion
-// of the visible surface in the pictures. `views`: those of the mounting that take part. Thread
-// contract: pure.
+// matched points and of the beads in the photographs, with focal length, principal point and mask
+// bias marginalised under their priors and the part that noise of the normals fakes taken off, is
+// compared with the mean square motion of the visible surface in the pictures. `views`: those of
+// the mounting that take part. Thread contract: pure.
 std::vector<FreeDirection> FreeDirectionsOf(const ContourMesh& mesh, const SmoothNormals& smooth,
                                             const RigModel& rig, const RefineResult& fit,
                                             std::span<const int> views,

@@ -226,6 +226,12 @@ std::vector<FreeDirection> ByView(const PhotoSet& photos, std::vector<FreeDirect
   return free;
 }
 
+ObservabilityOptions ObservabilityFor(const RefineResult& fit) {
+  ObservabilityOptions options;
+  options.weights.correlation_px = fit.correlation_px;
+  return options;
+}
+
 // What the accepted views of each mounting leave free.
 std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigModel& rig,
                                           const RefineResult& fit,
@@ -327,8 +333,7 @@ Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask>
                const RigAttempt& attempt, std::span<const Judgement> judgements) {
   const RigModel& rig = attempt.rig;
   const RefineResult& fit = attempt.fit;
-  ObservabilityOptions observability;
-  observability.weights.correlation_px = fit.correlation_px;
+  const ObservabilityOptions observability = ObservabilityFor(fit);
   RigPosterior posterior = PosteriorOf(rig, fit);
   const std::vector<std::string> notes =
       RigNotes(photos, rig, fit.parameters, posterior, attempt.changes, in.mesh.centre);
@@ -354,7 +359,11 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   SCAN_CHECK(CheckPoseInput(mesh, given, masks));
   const PhotoSet photos = options.no_priors ? WithoutPoses(given) : given;
   RigModel rig(photos, options.rig);
-  const std::vector<PhotoContour> contours = PhotoContours(masks);
+  if (!options.bead_findings.beads.empty() &&
+      options.bead_findings.images.size() != photos.photos.size())
+    return BadInput("the number of lists of bead images is not that of the photographs", "beads",
+                    "look for beads in every photograph");
+  std::vector<PhotoContour> contours = PhotoContours(masks);
   std::vector<bool> use(contours.size());
   for (std::size_t i = 0; i < use.size(); ++i) use[i] = !contours[i].empty();
   if (std::none_of(use.begin(), use.end(), [](bool u) { return u; }))
@@ -378,6 +387,10 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   SCAN_TRY(RigAttempt attempt, SolveWithChanges({contour_mesh, contours, names, use, known,
                                                  options.start, in.refine, options.changes},
                                                 rig, stop));
+  BeadOutcome beads;
+  if (!options.bead_findings.beads.empty())
+    beads = SolveWithBeads(contour_mesh, options.bead_findings, options.beads, in.refine,
+                           ObservabilityFor(attempt.fit), contours, attempt, stop);
   BentSpecimen bent;
   AllowForBends(in, attempt, bent, stop);
   const Evidence settled{bent.contours ? *bent.contours : contour_mesh, contours, options,
@@ -386,6 +399,8 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
   Poses poses = Conclude(settled, photos, masks, attempt, judgements);
+  poses.notes.insert(poses.notes.end(), beads.notes.begin(), beads.notes.end());
+  if (beads.sightings > 0) poses.nuisances["bead_residual_px"].value = beads.residual_px;
   for (const BentPart& part : bent.parts) poses.notes.push_back(BentPartNote(part));
   for (std::size_t i = 0; i < alternatives.size(); ++i)
     poses.views[i].alternatives = alternatives[i];
