@@ -109,6 +109,8 @@ Result<std::vector<Mask>> MakeEvidence(const PhotoSet& photos, const StageOption
 Result<Poses> SolvePoses(const TriangleMesh& mesh, const PhotoSet& photos,
                          std::span<const Mask> masks, const StageOptions& options,
                          const ProgressFn& progress, std::stop_token stop) {
+  if (options.method == PoseMethod::paper && !options.joint.bead_findings.beads.empty())
+    return BadInput("the paper's method knows no beads", "--method", "leave out --bead-colour");
   if (options.method == PoseMethod::paper)
     return SolvePaper(mesh, photos, masks, options.paper, progress, stop);
   return SolveJoint(mesh, photos, masks, options.joint, progress, stop);
@@ -137,7 +139,7 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
   SCAN_CHECK(CheckRequest(request));
   SCAN_TRY(StagedFolder staged, StagedFolder::Create(request.out, request.force));
   const fs::path& folder = staged.path();
-  const StageOptions& options = request.options;
+  StageOptions options = request.options;
   ReconstructResult result;
   Stopwatch stopwatch(result.stages);
 
@@ -150,10 +152,21 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
     SCAN_TRY(surface, ExtractSurface(*volume, options.surface, progress, stop));
     result.surface = surface->mesh;
     stopwatch.Lap("surface");
+    if (options.fiducials.wanted()) {
+      SCAN_TRY(options.joint.bead_findings,
+               FindFiducials(options.fiducials, &volume, result.photos, progress, stop));
+      stopwatch.Lap("beads");
+    }
   } else {
     SCAN_TRY(result.surface, ReadMesh(request.mesh));
     stopwatch.Lap("read mesh");
+    if (options.fiducials.wanted()) {
+      SCAN_TRY(options.joint.bead_findings,
+               FindFiducials(options.fiducials, nullptr, result.photos, progress, stop));
+    }
   }
+  if (!options.joint.bead_findings.beads.empty())
+    SCAN_CHECK(WriteBeads(folder / "beads.json", options.joint.bead_findings.beads));
   SCAN_CHECK(WritePly(folder / "surface.ply", result.surface));
 
   SCAN_TRY(const AtlasResult atlas, MakeAtlas(result.surface, options.atlas, progress, stop));

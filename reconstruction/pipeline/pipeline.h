@@ -4,6 +4,7 @@
 //   surface     ExtractSurface          Volume              -> TriangleMesh
 //   atlas       MakeAtlas               TriangleMesh        -> AtlasMesh
 //   masks       MakeMasks               PhotoSet            -> Mask per photograph
+//   beads       FindFiducials           Volume, PhotoSet    -> BeadFindings
 //   pose        SolveJoint, SolvePaper  mesh, photographs, masks -> Poses
 //   appearance  DecideFreeTurns         what silhouettes left free is decided by colour
 //   texture     MakeTexture             atlas, photographs, poses, masks -> pictures of the atlas
@@ -23,6 +24,7 @@
 #include "reconstruction/appearance/appearance.h"
 #include "reconstruction/atlas/atlas.h"
 #include "reconstruction/masks/make_masks.h"
+#include "reconstruction/pipeline/find_fiducials.h"
 #include "reconstruction/pose/paper/solve_paper.h"
 #include "reconstruction/pose/poses.h"
 #include "reconstruction/pose/solve_joint.h"
@@ -42,6 +44,7 @@ struct StageOptions {
   MaskOptions masks;
   std::optional<double> exclude_below_mm;  // above the platter: no evidence, no texture; see
                                            // ExcludeBelow
+  FiducialOptions fiducials;
   PoseMethod method = PoseMethod::joint;
   JointOptions joint;
   PaperOptions paper;
@@ -54,7 +57,7 @@ struct ReconstructRequest {
   std::filesystem::path volume;  // a CT volume, or
   std::filesystem::path mesh;    // a mesh of it; exactly one of the two
   std::filesystem::path out;     // folder: surface.ply atlas.obj poses/ albedo.png provenance.png
-                                 // model.glb report.html
+                                 // model.glb report.html; beads.json where asked for
   bool force = false;
   StageOptions options;
 };
@@ -80,7 +83,8 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request,
 Result<std::vector<Mask>> MakeEvidence(const PhotoSet& photos, const StageOptions& options,
                                        const ProgressFn& progress, std::stop_token stop);
 
-// By the method chosen. Errors and threads: as SolveJoint and SolvePaper.
+// By the method chosen. Errors: those of SolveJoint and SolvePaper; bad_input for beads with the
+// paper's. Threads: as these.
 Result<Poses> SolvePoses(const TriangleMesh& mesh, const PhotoSet& photos,
                          std::span<const Mask> masks, const StageOptions& options,
                          const ProgressFn& progress, std::stop_token stop);
