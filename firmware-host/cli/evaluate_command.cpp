@@ -21,6 +21,7 @@
 #include "reconstruction/evaluate/fig12.h"
 #include "reconstruction/evaluate/pose_trial.h"
 #include "reconstruction/evaluate/turntable_trial.h"
+#include "reconstruction/fiducials/find_bead_images.h"
 #include "reconstruction/masks/make_masks.h"
 #include "reconstruction/pipeline/pipeline.h"
 #include "reconstruction/specimens/specimen.h"
@@ -45,6 +46,7 @@ struct EvaluateOptions {
   double wrong_px = 5;
   std::size_t paper_faces = 12000;
   bool per_view = false;
+  bool beads = false;
   fs::path out, from;
   bool force = false;
   EvaluateModelOptions model;
@@ -52,6 +54,7 @@ struct EvaluateOptions {
   JointOptions joint;
   AppearanceOptions appearance;
 
+  std::string specimen_name() const { return specimen + (beads ? "+beads" : ""); }
   bool is_fig12() const { return preset == "fig12"; }
   bool was_captured() const { return !is_fig12() && !from.empty(); }
   // 0: as captured.
@@ -134,6 +137,7 @@ class ScratchFolder {
 struct Capture {
   PoseTrial trial;
   std::optional<Volume> volume;
+  BeadFindings beads;
   std::shared_ptr<const ScratchFolder> scratch;  // where the photographs lie, if nobody keeps them
 };
 
@@ -171,8 +175,10 @@ void DescribeTurns(const PoseTrial& trial, const Poses& poses, std::span<const F
 Result<Poses> SolveAll(const Capture& capture, const EvaluateOptions& options,
                        const CliContext& context, std::vector<FreeDirection>& free) {
   const PoseTrial& trial = capture.trial;
-  SCAN_TRY(Poses poses, SolveJoint(trial.mesh, trial.photos, trial.masks, options.joint,
-                                   context.progress, context.stop));
+  JointOptions joint = options.joint;
+  joint.bead_findings = capture.beads;
+  SCAN_TRY(Poses poses, SolveJoint(trial.mesh, trial.photos, trial.masks, joint, context.progress,
+                                   context.stop));
   free = poses.free_directions;
   // There are no photographs of another size.
   if (options.photo_width() > 0) return poses;
@@ -227,7 +233,7 @@ Result<Capture> CaptureIn(const DemoPaths& paths, const EvaluateOptions& options
       EvenlySpread(trial.photos.photos.size(), options.views > 0 ? options.views : 24);
   trial.masks.resize(trial.photos.photos.size());
   trial = Subset(trial, indices);
-  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen));
+  SCAN_TRY(const auto specimen, MakeSpecimen(options.specimen_name()));
   trial.surface = ExactSurface(*specimen, 0.3);
   TurntableErrors errors;
   errors.w = options.photo_width();
@@ -244,14 +250,21 @@ Result<Capture> CaptureIn(const DemoPaths& paths, const EvaluateOptions& options
   SCAN_TRY(SurfaceResult surface,
            ExtractSurface(*capture.volume, {}, context.progress, context.stop));
   trial.mesh = std::move(surface.mesh);
+  if (options.beads) {
+    FiducialOptions fiducials;
+    fiducials.bead_mm = 1.0;
+    SCAN_TRY(fiducials.bead_colour, ParseBeadColour("#0060ff"));
+    SCAN_TRY(capture.beads, FindFiducials(fiducials, &*capture.volume, trial.photos,
+                                          context.progress, context.stop));
+  }
   return capture;
 }
 
 Status CaptureInto(const fs::path& folder, const EvaluateOptions& options,
                    const CliContext& context) {
   const DemoPaths paths = DemoPathsIn(folder);
-  SCAN_CHECK(CaptureDemo(paths, options.specimen, options.errors, context));
-  return MakeDemoCt(paths, options.specimen);
+  SCAN_CHECK(CaptureDemo(paths, options.specimen_name(), options.errors, context));
+  return MakeDemoCt(paths, options.specimen_name());
 }
 
 // The paper renders its photographs from the mesh that it then searches; so does this (but for
@@ -268,7 +281,7 @@ Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
 Result<Capture> MakeCapture(const EvaluateOptions& options, const CliContext& context) {
   if (options.is_fig12()) {
     SCAN_TRY(PoseTrial trial, Fig12Trial(options));
-    return Capture{std::move(trial), {}, {}};
+    return Capture{std::move(trial), {}, {}, {}};
   }
   if (options.was_captured()) return CaptureIn(DemoPathsIn(options.from), options, context);
   if (options.out.empty()) {
@@ -324,6 +337,8 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
     options.model.model = options.what;
     return EvaluateModel(options.model, context);
   }
+  if (options.is_fig12() && options.beads)
+    return BadInput("the protocol of Fig 12 has no beads", "--beads", "leave out --preset fig12");
   if (options.is_fig12()) {
     // Exact masks: no bias is looked for.
     if (options.fig12.noise.bias_px == 0) options.joint.rig.mask_bias_px = 0.02;
@@ -336,6 +351,8 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
   if (options.was_captured()) {
     SCAN_TRY(const StationConfig station, LoadStationConfig(DemoPathsIn(options.from).config));
     options.specimen = station.sim.specimen;
+    options.beads = options.specimen.ends_with("+beads");
+    if (options.beads) options.specimen.resize(options.specimen.rfind("+beads"));
   }
   SCAN_TRY(const Capture capture, MakeCapture(options, context));
   const PoseTrial& trial = capture.trial;
@@ -434,6 +451,11 @@ void AddEvaluate(CommandSet& commands) {
       .add_option("--seed", options->fig12.seed,
                   "of the outlines' errors; fig12: of the cameras, too")
       ->capture_default_str();
+  command
+      .add_flag("--beads", options->beads,
+                "demo: three blue beads of 1 mm half sunk into the specimen, used by joint")
+      ->excludes("--width")
+      ->excludes("--full-size");
   AddStatedErrors(command, *options);
   command.add_option("--errors", options->errors, "of the simulated rig")
       ->check(CLI::IsMember({"ideal", "static", "dynamic"}))

@@ -10,6 +10,7 @@
 #include "drivers/base/staged_folder.h"
 #include "firmware-host/cli/commands.h"
 #include "reconstruction/atlas/chart_picture.h"
+#include "reconstruction/fiducials/find_bead_images.h"
 #include "reconstruction/mesh/mesh_io.h"
 #include "reconstruction/pipeline/pipeline.h"
 #include "reconstruction/render/shade.h"
@@ -27,6 +28,7 @@ struct ModelOptions {
   bool has_threshold = false;
   std::string method = "joint";
   std::string unfold = "lscm";
+  std::string bead_colour;
   StageOptions stages;
 };
 
@@ -39,6 +41,9 @@ Status Resolve(ModelOptions& options) {
     stages.volume.voxel_mm =
         Eigen::Vector3d(options.voxel_mm[0], options.voxel_mm[1], options.voxel_mm[2]);
   if (options.has_threshold) stages.surface.segment.threshold = options.threshold;
+  if (!options.bead_colour.empty()) {
+    SCAN_TRY(stages.fiducials.bead_colour, ParseBeadColour(options.bead_colour));
+  }
   stages.method = options.method == "paper" ? PoseMethod::paper : PoseMethod::joint;
   stages.atlas.method = options.unfold == "arap" ? UnfoldMethod::arap : UnfoldMethod::lscm;
   return {};
@@ -89,6 +94,13 @@ void AddPoseOptions(CLI::App& command, ModelOptions& options) {
   command.add_option("--chains", options.stages.paper.chains, "of the paper's hill climbing")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+}
+
+void AddBeadOptions(CLI::App& command, ModelOptions& options) {
+  command.add_option("--beads", options.stages.fiducials.beads,
+                     "joint: beads.json that reconstruct wrote: where X-rays show the beads");
+  command.add_option("--bead-colour", options.bead_colour,
+                     "joint: of the beads, #rrggbb; a strong one that the specimen has not");
 }
 
 void AddOut(CLI::App& command, ModelOptions& options, const std::string& what) {
@@ -213,6 +225,11 @@ Result<CommandOutput> RunPose(ModelOptions& options, const CliContext& context) 
   SCAN_TRY(const PhotoSet photos, LoadPhotoSet(options.session));
   SCAN_TRY(const std::vector<Mask> masks,
            MakeEvidence(photos, options.stages, context.progress, context.stop));
+  if (options.stages.fiducials.wanted()) {
+    SCAN_TRY(
+        options.stages.joint.bead_findings,
+        FindFiducials(options.stages.fiducials, nullptr, photos, context.progress, context.stop));
+  }
   SCAN_TRY(Poses poses,
            SolvePoses(mesh, photos, masks, options.stages, context.progress, context.stop));
   poses.model = options.mesh.filename().string();
@@ -313,6 +330,7 @@ void AddPose(CommandSet& commands) {
   command.add_option("--mesh", options->mesh, "PLY or OBJ file, mm")->required();
   AddOut(command, *options, "folder to write");
   AddPoseOptions(command, *options);
+  AddBeadOptions(command, *options);
 }
 
 void AddTexture(CommandSet& commands) {
@@ -339,6 +357,11 @@ void AddReconstruct(CommandSet& commands) {
   AddAtlasOptions(command, *options);
   AddPoseOptions(command, *options);
   AddAppearanceOptions(command, *options);
+  command
+      .add_option("--bead-mm", options->stages.fiducials.bead_mm,
+                  "joint: diameter of beads on specimen or holder, denser than it")
+      ->check(Positive());
+  AddBeadOptions(command, *options);
 }
 
 }  // namespace scan
