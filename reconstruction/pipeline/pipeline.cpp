@@ -154,7 +154,7 @@ Result<ReconstructResult> Reconstruct(const ReconstructRequest& request, const P
     stopwatch.Lap("surface");
     if (options.fiducials.wanted()) {
       SCAN_TRY(options.joint.bead_findings,
-               FindFiducials(options.fiducials, &volume, result.photos, progress, stop));
+               FindFiducials(options.fiducials, &*volume, result.photos, progress, stop));
       stopwatch.Lap("beads");
     }
   } else {
