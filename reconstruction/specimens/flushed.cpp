@@ -23,7 +23,8 @@ class FlushedTomato final : public Specimen {
   // Over the tomato's own pattern, which has nothing to do with what lies under it.
   Vector3d Albedo(const Vector3d& p) const override {
     const Vector3d yellow = FromSrgb8(214, 172, 62);
-    return Bounded(Mix(yellow, tomato_->Albedo(p), 0.35 + 0.65 * Ripeness(p)));
+    const double speckle = 1 + 0.25 * FractalNoise(p / 0.8, 2, 0.5, 541);
+    return Bounded(speckle * Mix(yellow, tomato_->Albedo(p), 0.35 + 0.65 * Ripeness(p)));
   }
 
   double Density(const Vector3d& p) const override {
