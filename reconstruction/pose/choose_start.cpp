@@ -1,11 +1,8 @@
 #include "reconstruction/pose/choose_start.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <cmath>
 
-#include "reconstruction/pose/acceptance.h"
+#include "reconstruction/pose/outline_distance.h"
 #include "reconstruction/pose/rigid_motion.h"
 
 namespace scan {
@@ -38,23 +35,8 @@ Refined RefineFrom(const ContourMesh& mesh, RigModel& rig, int mounting,
   rig.set_start(mounting, start);
   const RefineResult fit =
       RefineJoint(mesh, rig, photos, use, rig.Nominal(), options, std::move(stop));
-  std::vector<double> distance(photos.size(), 0);
-  tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
-    if (!use[i]) return;
-    const int view = static_cast<int>(i);
-    const ViewState state{rig.CameraFromModelOf(fit.parameters, view),
-                          rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens),
-                          fit.parameters.mask_bias_px};
-    distance[i] = TwoWayDistance(mesh, photos[i], state, clip_px, options.spacing_px);
-  });
-  Refined refined{rig.TableFromModelOf(fit.parameters, mounting), 0};
-  double count = 0;
-  for (std::size_t i = 0; i < photos.size(); ++i) {
-    refined.distance_px += distance[i];
-    count += use[i] ? 1 : 0;
-  }
-  refined.distance_px /= std::max(1.0, count);
-  return refined;
+  return {rig.TableFromModelOf(fit.parameters, mounting),
+          MeanOutlineDistance(mesh, rig, fit.parameters, photos, use, clip_px, options.spacing_px)};
 }
 
 }  // namespace

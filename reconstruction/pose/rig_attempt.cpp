@@ -1,11 +1,9 @@
 #include "reconstruction/pose/rig_attempt.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
-#include "reconstruction/pose/acceptance.h"
 #include "reconstruction/pose/choose_start.h"
+#include "reconstruction/pose/outline_distance.h"
 
 namespace scan {
 namespace {
@@ -18,23 +16,9 @@ bool AnyLogged(const RigModel& rig) {
                      [](const RigView& view) { return view.logged; });
 }
 
-double MeanDistance(const AttemptInput& in, const std::vector<bool>& use, const RigModel& rig,
-                    const RigParameters& parameters) {
-  const double clip_px = 1.5 * in.refine.last_window_px;
-  std::vector<double> distance(in.photos.size(), 0);
-  tbb::parallel_for(std::size_t{0}, in.photos.size(), [&](std::size_t i) {
-    if (!use[i]) return;
-    const ViewState state{rig.CameraFromModelOf(parameters, static_cast<int>(i)),
-                          rig.IntrinsicsOf(parameters, rig.views()[i].lens),
-                          parameters.mask_bias_px};
-    distance[i] = TwoWayDistance(in.mesh, in.photos[i], state, clip_px, in.refine.spacing_px);
-  });
-  double sum = 0, count = 0;
-  for (std::size_t i = 0; i < distance.size(); ++i) {
-    sum += distance[i];
-    count += use[i] ? 1 : 0;
-  }
-  return sum / std::max(1.0, count);
+double DistanceOf(const AttemptInput& in, const RigAttempt& attempt, const std::vector<bool>& use) {
+  return MeanOutlineDistance(in.mesh, attempt.rig, attempt.fit.parameters, in.photos, use,
+                             1.5 * in.refine.last_window_px, in.refine.spacing_px);
 }
 
 // Changes are of a rig that shows this specimen: they leave most views in, and those explained.
@@ -43,8 +27,7 @@ bool AreOfTheRig(const AttemptInput& in, const RigAttempt& attempt) {
   const auto views = std::count(in.use.begin(), in.use.end(), true);
   const auto left = std::count(attempt.use.begin(), attempt.use.end(), true);
   return 4 * left >= 3 * views &&
-         MeanDistance(in, attempt.use, attempt.rig, attempt.fit.parameters) <
-             kExplainedPx * UnitPx(in.refine);
+         DistanceOf(in, attempt, attempt.use) < kExplainedPx * UnitPx(in.refine);
 }
 
 Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std::stop_token stop) {
@@ -68,7 +51,7 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
   }
   if (stop.stop_requested()) return Cancelled("pose");
   if (!attempt.changes.empty() && !AreOfTheRig(in, attempt)) attempt = plain;
-  attempt.distance_px = MeanDistance(in, in.use, attempt.rig, attempt.fit.parameters);
+  attempt.distance_px = DistanceOf(in, attempt, in.use);
   return attempt;
 }
 

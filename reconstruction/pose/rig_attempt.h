@@ -13,9 +13,6 @@
 
 namespace scan {
 
-// Mean distance, in a picture 1848 px wide, of outlines that are of this specimen.
-constexpr double kExplainedPx = 3;
-
 struct RigAttempt {
   RigModel rig;  // with what the changes needed
   RefineResult fit;

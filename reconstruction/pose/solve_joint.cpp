@@ -8,6 +8,7 @@
 
 #include "reconstruction/pose/joint_result.h"
 #include "reconstruction/pose/observability.h"
+#include "reconstruction/pose/outline_distance.h"
 #include "reconstruction/pose/picture_cost.h"
 #include "reconstruction/pose/pose_input.h"
 #include "reconstruction/pose/rig_attempt.h"
@@ -252,21 +253,28 @@ std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigMode
 }
 
 // Residuals of a good fit leave nothing to ask: the scale is looked at only above a pixel of a
-// picture 1848 px wide.
-void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vector<bool>& views,
-                        const RefineResult& fit, std::vector<Judgement>& judgements,
-                        std::stop_token stop) {
-  const auto stands = [&](std::size_t i) {
-    return rig.views()[i].logged && judgements[i].reason.empty();
+// picture 1848 px wide, or where no logged pose explains its outline (then from as far away as the
+// solve began).
+void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vector<bool>& use,
+                        const RigParameters& parameters, std::span<const ViewFit> fits,
+                        std::vector<Judgement>& judgements, std::stop_token stop) {
+  std::vector<bool> logged(use.size()), stand(use.size());
+  for (std::size_t i = 0; i < use.size(); ++i) {
+    logged[i] = use[i] && rig.views()[i].logged;
+    stand[i] = logged[i] && judgements[i].reason.empty();
+  }
+  const auto any = [](const std::vector<bool>& views) {
+    return std::find(views.begin(), views.end(), true) != views.end();
   };
-  bool any = false;
-  for (std::size_t i = 0; i < judgements.size(); ++i) any |= stands(i);
-  if (!any || PooledSigma(fit.fits) < in.scale) return;
+  if (!any(logged) || (any(stand) && PooledSigma(fits) < in.scale)) return;
   RefineOptions refine = in.refine;
-  refine.first_window_px = 4 * refine.last_window_px;
-  const std::string reason = RefutedScale(in.mesh, rig, in.photos, views, fit, refine, stop);
+  if (any(stand)) refine.first_window_px = 4 * refine.last_window_px;
+  const std::vector<bool>& views = any(stand) ? stand : logged;
+  const std::string reason =
+      RefutedScale(in.mesh, rig, in.photos, views, parameters, refine, std::move(stop));
+  if (reason.empty()) return;
   for (std::size_t i = 0; i < judgements.size(); ++i)
-    if (stands(i)) judgements[i].reason = reason;
+    if (logged[i]) judgements[i].reason = reason;
 }
 
 // The specimen as it stands in the photographs.
@@ -323,7 +331,7 @@ std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
     fit = RefineJoint(in.mesh, rig, in.photos, agree, fit.parameters, again, stop);
     judgements = Judge(in, rig, fit);
   }
-  RejectRefutedScale(in, rig, agree, fit, judgements, stop);
+  RejectRefutedScale(in, rig, attempt.use, fit.parameters, fit.fits, judgements, stop);
   RejectViewsAlone(in, rig, fit.parameters, attempt.changes, judgements);
   return judgements;
 }

@@ -5,19 +5,23 @@
 #include <cmath>
 
 #include "reconstruction/pose/joint_result.h"
+#include "reconstruction/pose/outline_distance.h"
 
 namespace scan {
 
 std::string RefutedScale(const ContourMesh& mesh, RigModel rig,
                          std::span<const PhotoContour> photos, const std::vector<bool>& views,
-                         const RefineResult& fit, const RefineOptions& options,
+                         const RigParameters& start, const RefineOptions& options,
                          std::stop_token stop) {
   constexpr double kFree = 0.5;     // prior of the scale's logarithm when it is free
   constexpr double kSigmas = 3.29;  // 99.9 %
   const double stated_sigma = rig.priors().ct_scale_rel;
   rig.set_ct_scale_sigma(kFree);
-  const RefineResult free = RefineJoint(mesh, rig, photos, views, fit.parameters, options, stop);
-  if (stop.stop_requested()) return {};
+  const RefineResult free = RefineJoint(mesh, rig, photos, views, start, options, stop);
+  if (stop.stop_requested() ||
+      MeanOutlineDistance(mesh, rig, free.parameters, photos, views, 1.5 * options.last_window_px,
+                          options.spacing_px) > kExplainedPx * UnitPx(options))
+    return {};
   const RigPosterior posterior = PosteriorOf(rig, free);
   const int at = posterior.layout.ct_scale();
   const double sigma = std::hypot(stated_sigma, std::sqrt(posterior.covariance(at, at)));

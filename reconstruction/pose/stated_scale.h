@@ -10,14 +10,15 @@
 
 namespace scan {
 
-// Solves again with the mesh's scale free, from `fit`. Empty when the scale found is within
-// 99.9 % of what the priors of scale, distance and focal length and the outlines allow; else the
-// reason to reject every view with a logged pose. A wrong scale does not show in the deviations of
-// `fit`: its residuals grow, and with them the noise that they are weighed by.
+// Solves again with the mesh's scale free, from `start`. Empty when the scale found is within
+// 99.9 % of what the priors of scale, distance and focal length and the outlines allow, or does not
+// explain the outlines either; else the reason to reject every view with a logged pose. A wrong
+// scale does not show in the deviations of a solve that holds it: its residuals grow, and with them
+// the noise that they are weighed by.
 // `views`: those whose outlines count. Thread contract: pure; parallel inside.
 std::string RefutedScale(const ContourMesh& mesh, RigModel rig,
                          std::span<const PhotoContour> photos, const std::vector<bool>& views,
-                         const RefineResult& fit, const RefineOptions& options,
+                         const RigParameters& start, const RefineOptions& options,
                          std::stop_token stop);
 
 }  // namespace scan
