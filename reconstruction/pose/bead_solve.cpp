@@ -63,6 +63,7 @@ class BeadSolver {
 
   RigParameters& parameters() { return parameters_; }
   std::vector<std::string>& notes() { return notes_; }
+  bool turned() const { return turned_; }
 
   void TurnMountings() {
     for (int m = 0; m < static_cast<int>(believed_.size()); ++m)
@@ -161,6 +162,7 @@ class BeadSolver {
     const TableFromModel placing = attempt_.rig.TableFromModelOf(parameters_, m);
     attempt_.rig.set_start(m, placing * TurnAboutScrew(axis, turns->best_rad));
     parameters_.mountings[static_cast<std::size_t>(m)] = {};
+    turned_ = true;
     return true;
   }
 
@@ -217,6 +219,7 @@ class BeadSolver {
   RigParameters parameters_;
   std::vector<bool> believed_;  // by mounting
   std::vector<bool> left_out_;  // by bead
+  bool turned_ = false;
   std::size_t strangers_ = 0;
   std::vector<std::string> notes_;
 };
@@ -269,6 +272,7 @@ BeadOutcome SolveWithBeads(const ContourMesh& mesh, const BeadFindings& findings
   BeadOutcome outcome;
   BeadSolver solver(mesh, findings, options, observability, attempt);
   solver.TurnMountings();
+  outcome.turned = solver.turned();
   RefineOptions again = refine;
   again.first_window_px = 2 * refine.last_window_px;
   for (const double reach : reaches) {

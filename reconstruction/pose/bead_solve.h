@@ -44,6 +44,7 @@ std::optional<BeadTurns> ScoreTurns(const BeadScene& scene, std::span<const Bead
 struct BeadOutcome {
   std::size_t sightings = 0;
   double residual_px = 0;          // RMS of both components, of those sightings
+  bool turned = false;             // a mounting was
   std::vector<std::string> notes;  // sentences for the report
 };
 

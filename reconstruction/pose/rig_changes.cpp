@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/pose/acceptance.h"
 #include "reconstruction/pose/rigid_motion.h"
 #include "reconstruction/pose/view_start.h"
 
@@ -134,16 +135,31 @@ RigEvidence EvidenceOfViewsAlone(const ContourMesh& mesh, const RigModel& rig,
                                  std::span<const PhotoContour> photos, const std::vector<bool>& use,
                                  const RigParameters& parameters, double correlation_px,
                                  const RefineOptions& options) {
+  // 99.9 % of what six parameters gain by chance: half of chi squared.
+  constexpr double kLeastGain = 11.2;
   RefineOptions alone = options;
   alone.first_window_px = options.first_window_px / 2;
   RigEvidence evidence(photos.size());
   tbb::parallel_for(std::size_t{0}, photos.size(), [&](std::size_t i) {
     if (!use[i]) return;
-    ViewState state{rig.CameraFromModelOf(parameters, static_cast<int>(i)),
-                    rig.IntrinsicsOf(parameters, rig.views()[i].lens), parameters.mask_bias_px};
-    state.camera_from_model = RefineView(mesh, photos[i], state, alone);
-    evidence[i] =
-        FitView(mesh, photos[i], state, options.last_window_px, correlation_px, options).evidence;
+    const ViewState by_rig{rig.CameraFromModelOf(parameters, static_cast<int>(i)),
+                           rig.IntrinsicsOf(parameters, rig.views()[i].lens),
+                           parameters.mask_bias_px};
+    ViewState own = by_rig;
+    own.camera_from_model = RefineView(mesh, photos[i], by_rig, alone);
+    const auto fit_at = [&](const ViewState& state) {
+      return FitView(mesh, photos[i], state, options.last_window_px, correlation_px, options);
+    };
+    ViewFit fit = fit_at(own);
+    const auto misfit = [&](const ViewState& state) {
+      return Misfit(mesh, photos[i], state, fit.sigma_px, correlation_px, options.spacing_px);
+    };
+    // The noise is as unknown as the pose: the logarithm of the likelihood ratio is that of the
+    // variances, for each independent observation of the outline.
+    const double gain =
+        0.5 * photos[i].length_px / correlation_px * std::log(misfit(by_rig) / misfit(own));
+    if (!(gain > kLeastGain)) fit = fit_at(by_rig);
+    evidence[i] = std::move(fit.evidence);
   });
   return evidence;
 }

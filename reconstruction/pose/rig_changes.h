@@ -35,7 +35,8 @@ struct ChangeOptions {
 };
 
 // Evidence of every view in use, linearised at the pose that its outline alone leads to from the
-// pose at `parameters`. Parallel inside.
+// pose at `parameters`; at that pose itself where the outline is explained no better by its own: a
+// round specimen's outline leads some degrees about its axis, by chance. Parallel inside.
 using RigEvidence = std::vector<std::optional<CondensedEvidence>>;
 RigEvidence EvidenceOfViewsAlone(const ContourMesh& mesh, const RigModel& rig,
                                  std::span<const PhotoContour> photos, const std::vector<bool>& use,

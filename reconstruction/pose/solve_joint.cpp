@@ -277,6 +277,42 @@ void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vect
     if (logged[i]) judgements[i].reason = reason;
 }
 
+struct WithBeads {
+  RigAttempt attempt;
+  BeadOutcome beads;
+};
+
+// `contours`: in.photos, which receive the beads.
+Result<WithBeads> SolveRigAndBeads(const Evidence& in, const PhotoSet& photos,
+                                   std::span<PhotoContour> contours, const std::vector<bool>& use,
+                                   std::vector<bool> known, RigModel rig,
+                                   const std::stop_token& stop) {
+  std::vector<std::string> names;
+  for (const Photo& photo : photos.photos) names.push_back(photo.id);
+  const auto attempt_from = [&](const RigModel& start) {
+    return SolveWithChanges(
+        {in.mesh, contours, names, use, known, in.options.start, in.refine, in.options.changes},
+        start, stop);
+  };
+  const auto with_beads = [&](RigAttempt& attempt) {
+    return SolveWithBeads(in.mesh, in.options.bead_findings, in.options.beads, in.refine,
+                          ObservabilityFor(attempt.fit), contours, attempt, stop);
+  };
+  SCAN_TRY(RigAttempt attempt, attempt_from(rig));
+  if (in.options.bead_findings.beads.empty()) return WithBeads{std::move(attempt), {}};
+  BeadOutcome beads = with_beads(attempt);
+  if (!beads.turned && attempt.changes.empty())
+    return WithBeads{std::move(attempt), std::move(beads)};
+  // What seemed wrong with the rig was told without the beads, of a specimen turned elsewhere.
+  for (int m = 0; m < static_cast<int>(rig.mounting_ids().size()); ++m) {
+    rig.set_start(m, attempt.rig.TableFromModelOf(attempt.fit.parameters, m));
+    known[static_cast<std::size_t>(m)] = true;
+  }
+  SCAN_TRY(attempt, attempt_from(rig));
+  beads = with_beads(attempt);
+  return WithBeads{std::move(attempt), std::move(beads)};
+}
+
 // The specimen as it stands in the photographs.
 struct BentSpecimen {
   std::vector<BentPart> parts;
@@ -390,15 +426,8 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   const Alternatives alternatives = StartViewsAlone(in, photos, rig, use, known, stop);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: refine", 0.5);
-  std::vector<std::string> names;
-  for (const Photo& photo : photos.photos) names.push_back(photo.id);
-  SCAN_TRY(RigAttempt attempt, SolveWithChanges({contour_mesh, contours, names, use, known,
-                                                 options.start, in.refine, options.changes},
-                                                rig, stop));
-  BeadOutcome beads;
-  if (!options.bead_findings.beads.empty())
-    beads = SolveWithBeads(contour_mesh, options.bead_findings, options.beads, in.refine,
-                           ObservabilityFor(attempt.fit), contours, attempt, stop);
+  SCAN_TRY(WithBeads solved, SolveRigAndBeads(in, photos, contours, use, known, rig, stop));
+  auto& [attempt, beads] = solved;
   BentSpecimen bent;
   AllowForBends(in, attempt, bent, stop);
   const Evidence settled{bent.contours ? *bent.contours : contour_mesh, contours, options,

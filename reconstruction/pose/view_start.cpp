@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "reconstruction/pose/acceptance.h"
+#include "reconstruction/pose/bead_evidence.h"
 #include "reconstruction/pose/poses.h"
 #include "reconstruction/pose/rigid_motion.h"
 
@@ -65,7 +66,8 @@ CameraFromModel RefineView(const ContourMesh& mesh, const PhotoContour& photo,
     weights.sigma_px = std::max(RobustSigma(match.matches), options.sigma_floor_px);
     weights.correlation_px = options.correlation_floor_px;
     const Eigen::Vector3d pivot = state.camera_from_model * mesh.centre;
-    const CondensedEvidence evidence = Condense(state, match.matches, pivot, weights);
+    CondensedEvidence evidence = Condense(state, match.matches, pivot, weights);
+    AddBeads(photo.beads, evidence);
     if (evidence.weight < kLeastObservations || !(pivot.z() > mesh.radius_mm)) break;
     const Vector6d step = Step(evidence, pivot.z());
     state.camera_from_model = MovedAbout(state.camera_from_model, step, pivot);
