@@ -4,20 +4,24 @@
 #include <openssl/evp.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cassert>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "drivers/base/files.h"
 #include "drivers/base/units.h"
 #include "reconstruction/render/rasterise.h"
 #include "reconstruction/report/pictures.h"
+#include "reconstruction/report/pose_pictures.h"
 
 namespace scan {
 namespace {
 
 constexpr int kPanelPx = 420;  // longest side of a view's panel
 constexpr int kAtlasPx = 640;  // side of the atlas pictures
+constexpr int kRingPx = 760;   // width of the camera ring
 
 constexpr char kStyle[] = R"css(
 :root{color-scheme:light dark;--line:#8884;--bad:#c0392b;--good:#2e8b57}
@@ -181,6 +185,70 @@ std::string AtlasHtml(const ReportInput& input) {
          "<span style=\"background:#fff\"></span>no surface</p>\n";
 }
 
+std::string RingHtml(const ReportInput& input) {
+  const auto cameras = RingOf(*input.photos, *input.poses);
+  const RingPicture ring = DrawRing(cameras, input.atlas->mesh, input.poses->free_directions,
+                                    UpInModel(*input.photos, *input.poses), kRingPx);
+  if (ring.picture.empty()) return "";
+  const bool logged = std::any_of(cameras.begin(), cameras.end(),
+                                  [](const RingCamera& c) { return c.nominal.has_value(); });
+  std::string caption =
+      "Cameras round the model, solved ones filled (red: rejected) with their "
+      "viewing direction";
+  if (logged)
+    caption += fmt::format(
+        ", logged ones hollow; differences between both drawn {:g} times as long", ring.enlarged);
+  if (!input.poses->free_directions.empty()) caption += "; dashed: axis of a free rotation";
+  return FigureHtml(ring.picture, caption + ".");
+}
+
+Result<std::string> EllipsesHtml(const ReportInput& input, std::size_t index, const char* which) {
+  const ViewPose& view = input.poses->views[index];
+  const Photo& photo = input.photos->photos[index];
+  cv::Mat picture =
+      cv::imread(photo.path.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  if (picture.empty())
+    return BadInput("cannot read the photograph", photo.path.string(), "check the file");
+  const Intrinsics& intrinsics = IntrinsicsOf(*input.poses, view, input.photos->intrinsics(photo));
+  const cv::Mat& mask = input.masks[index].coverage;
+  const Crop crop = CropAround(mask, mask, kPanelPx);
+  std::vector<SurfaceEllipse> ellipses = SurfaceEllipses(input.atlas->mesh, view, intrinsics, 8);
+  if (ellipses.empty()) return std::string();
+  for (SurfaceEllipse& e : ellipses) {
+    e.centre_px = crop.scale * (e.centre_px - Eigen::Vector2d(crop.full_px.x, crop.full_px.y));
+    e.covariance_px2 *= crop.scale * crop.scale;
+  }
+  const double factor = EllipseFactor(ellipses, kPanelPx / 40.0);
+  return FigureHtml(
+      DrawEllipses(CropOf(picture, crop), ellipses, factor),
+      fmt::format("{}, the {} determined view: 1 σ of points of the surface, drawn {:g} times as "
+                  "large (median {:.3f} px, full size)",
+                  view.name, which, factor, view.surface_sigma_px.median));
+}
+
+// Where the cameras stand and how well that is known.
+Result<std::string> CamerasHtml(const ReportInput& input) {
+  std::string html = "<div class=\"panels\">" + RingHtml(input);
+  const auto& views = input.poses->views;
+  std::optional<std::size_t> best, worst;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (views[i].status != ViewStatus::accepted || !(views[i].surface_sigma_px.median > 0))
+      continue;
+    const auto sigma = [&](std::size_t k) { return views[k].surface_sigma_px.median; };
+    if (!best || sigma(i) < sigma(*best)) best = i;
+    if (!worst || sigma(i) > sigma(*worst)) worst = i;
+  }
+  if (best) {
+    SCAN_TRY(const std::string ellipses, EllipsesHtml(input, *best, "best"));
+    html += ellipses;
+  }
+  if (worst && worst != best) {
+    SCAN_TRY(const std::string ellipses, EllipsesHtml(input, *worst, "least"));
+    html += ellipses;
+  }
+  return html + "</div>\n";
+}
+
 }  // namespace
 
 Status WriteReport(const std::filesystem::path& path, const ReportInput& input) {
@@ -201,6 +269,8 @@ Status WriteReport(const std::filesystem::path& path, const ReportInput& input) 
     html += "<p class=\"note\">" + Escaped(note) + "</p>\n";
   html += FiguresTable(input.figures);
   html += "<h2>Texture</h2>\n" + AtlasHtml(input);
+  SCAN_TRY(const std::string cameras, CamerasHtml(input));
+  html += "<h2>Cameras</h2>\n" + cameras;
   html += "<h2>Views</h2>\n";
   for (const auto& view : views) {
     if (!view) return tl::unexpected<Error>(view.error());
