@@ -278,8 +278,8 @@ BeadOutcome SolveWithBeads(const ContourMesh& mesh, const BeadFindings& findings
   for (const double reach : reaches) {
     outcome.sightings = solver.Recognise(reach, photos);
     if (outcome.sightings == 0 || stop.stop_requested()) break;
-    attempt.fit =
-        RefineJoint(mesh, attempt.rig, photos, attempt.use, solver.parameters(), again, stop);
+    attempt.fit = Continued(attempt.fit, RefineJoint(mesh, attempt.rig, photos, attempt.use,
+                                                     solver.parameters(), again, stop));
     solver.parameters() = attempt.fit.parameters;
   }
   if (outcome.sightings > 0) {

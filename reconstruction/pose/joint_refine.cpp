@@ -41,6 +41,11 @@ double PooledSigma(std::span<const ViewFit> fits) {
   return sigma[sigma.size() / 2];
 }
 
+RefineResult Continued(const RefineResult& earlier, RefineResult later) {
+  later.steps.insert(later.steps.begin(), earlier.steps.begin(), earlier.steps.end());
+  return later;
+}
+
 ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
                 double window_px, double correlation_px, const RefineOptions& options) {
   ViewFit fit;
@@ -100,6 +105,8 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
                                              rig.CameraFromModelOf(result.parameters, view),
                                              rig.nominal_intrinsics(rig.views()[i].lens)));
     }
+    result.steps.push_back(
+        {result.cost, moved_px, window_px, PooledSigma(result.fits), result.steps.empty()});
     const bool at_last_window = window_px <= options.last_window_px;
     if (at_last_window && estimated < kEstimates) {
       ++estimated;

@@ -11,6 +11,7 @@
 #include "reconstruction/mesh/mesh.h"
 #include "reconstruction/pose/contour_evidence.h"
 #include "reconstruction/pose/contour_sample.h"
+#include "reconstruction/pose/diagnostics.h"
 #include "reconstruction/pose/rig_solve.h"
 
 namespace scan {
@@ -48,7 +49,11 @@ struct RefineResult {
   double correlation_px = 0;  // used for the weights, see RefineOptions
   int iterations = 0;
   bool converged = false;
+  std::vector<SolveStep> steps;  // one for each iteration; earlier solves' first where Continued
 };
+
+// `later`, which started where `earlier` ended, with the steps of both.
+RefineResult Continued(const RefineResult& earlier, RefineResult later);
 
 // `use[i]` is false for views that take no part; photos[i] may then be empty.
 // Parallel over the views inside; the same bytes for any number of threads. Stops early, not

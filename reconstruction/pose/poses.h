@@ -11,6 +11,7 @@
 #include "drivers/base/frames.h"
 #include "drivers/base/intrinsics.h"
 #include "drivers/base/result.h"
+#include "reconstruction/pose/diagnostics.h"
 
 namespace scan {
 
@@ -91,6 +92,7 @@ struct Poses {
   std::vector<FreeDirection> free_directions;
   std::vector<ViewPose> views;
   std::vector<std::string> notes;  // sentences for the report: what the data cannot show and why
+  PoseDiagnostics diagnostics;     // not written to poses.json
 };
 
 // The solved camera of a view's lens state; `nominal` where the method solves none.

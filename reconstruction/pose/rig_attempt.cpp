@@ -47,7 +47,8 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
     attempt.changes.insert(attempt.changes.end(), found.begin(), found.end());
     RefineOptions again = in.refine;
     again.first_window_px = 2 * in.refine.last_window_px;
-    attempt.fit = RefineJoint(in.mesh, rig, in.photos, attempt.use, parameters, again, stop);
+    attempt.fit = Continued(
+        attempt.fit, RefineJoint(in.mesh, rig, in.photos, attempt.use, parameters, again, stop));
   }
   if (stop.stop_requested()) return Cancelled("pose");
   if (!attempt.changes.empty() && !AreOfTheRig(in, attempt)) attempt = plain;

@@ -11,6 +11,7 @@
 #include "reconstruction/pose/outline_distance.h"
 #include "reconstruction/pose/picture_cost.h"
 #include "reconstruction/pose/pose_input.h"
+#include "reconstruction/pose/pose_spectrum.h"
 #include "reconstruction/pose/rig_attempt.h"
 #include "reconstruction/pose/rig_notes.h"
 #include "reconstruction/pose/stated_scale.h"
@@ -343,8 +344,8 @@ void AllowForBends(const Evidence& in, RigAttempt& attempt, BentSpecimen& specim
       RefineBends(*specimen.contours, fits_of(*specimen.contours), options, specimen.parts);
     specimen.mesh = WithBends(in.mesh.mesh, specimen.parts);
     specimen.contours.emplace(specimen.mesh);
-    fit = RefineJoint(*specimen.contours, attempt.rig, in.photos, attempt.use, fit.parameters,
-                      again, stop);
+    fit = Continued(fit, RefineJoint(*specimen.contours, attempt.rig, in.photos, attempt.use,
+                                     fit.parameters, again, stop));
   }
 }
 
@@ -358,7 +359,8 @@ std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
   RefineOptions again = in.refine;
   again.first_window_px = 2 * in.refine.last_window_px;
   if (FreeWhatIsSeen(rig, PosteriorOf(rig, fit)))
-    fit = RefineJoint(in.mesh, rig, in.photos, attempt.use, fit.parameters, again, stop);
+    fit = Continued(fit,
+                    RefineJoint(in.mesh, rig, in.photos, attempt.use, fit.parameters, again, stop));
   auto judgements = Judge(in, rig, fit);
   std::vector<bool> agree = attempt.use;
   for (std::size_t i = 0; i < agree.size(); ++i)
@@ -368,8 +370,8 @@ std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
   // Cramer-Rao bound by 6 % (924 x 612).
   again.spacing_px = 0.5 * in.refine.spacing_px;
   if (agree == attempt.use) again.first_window_px = in.refine.last_window_px;
-  fit =
-      RefineJoint(in.mesh, rig, in.photos, some ? agree : attempt.use, fit.parameters, again, stop);
+  fit = Continued(fit, RefineJoint(in.mesh, rig, in.photos, some ? agree : attempt.use,
+                                   fit.parameters, again, stop));
   judgements = Judge(in, rig, fit);
   RejectRefutedScale(in, rig, attempt.use, fit.parameters, fit.fits, judgements, stop);
   RejectViewsAlone(in, rig, fit.parameters, attempt.changes, judgements);
@@ -389,6 +391,9 @@ Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask>
   for (const FreeDirection& direction : free) AddFreedom(rig, fit.parameters, direction, posterior);
   Poses poses = Describe(in.mesh, photos, masks, rig, fit, posterior, judgements);
   poses.model = in.options.model;
+  poses.diagnostics = {fit.steps, in.refine.converged_px, fit.converged,
+                       SolveSpectrum(photos, rig, fit),
+                       PlacingSpectra(in.mesh, rig, posterior, fit.parameters)};
   poses.free_directions = ByView(photos, free);
   poses.nuisances["residual_sigma_px"].value = PooledSigma(fit.fits);
   poses.nuisances["residual_correlation_px"].value = fit.correlation_px;

@@ -15,6 +15,7 @@
 #include "reconstruction/render/rasterise.h"
 #include "reconstruction/report/pictures.h"
 #include "reconstruction/report/pose_pictures.h"
+#include "reconstruction/report/pose_plots.h"
 
 namespace scan {
 namespace {
@@ -22,6 +23,7 @@ namespace {
 constexpr int kPanelPx = 420;  // longest side of a view's panel
 constexpr int kAtlasPx = 640;  // side of the atlas pictures
 constexpr int kRingPx = 760;   // width of the camera ring
+constexpr int kPlotWidePx = 560, kPlotHighPx = 340;
 
 constexpr char kStyle[] = R"css(
 :root{color-scheme:light dark;--line:#8884;--bad:#c0392b;--good:#2e8b57}
@@ -71,11 +73,12 @@ std::string DataUri(const cv::Mat& picture, const char* extension, const char* m
   return fmt::format("data:{};base64,{}", mime, base64);
 }
 
-std::string FigureHtml(const cv::Mat& picture, const std::string& caption) {
+std::string FigureHtml(const cv::Mat& picture, const std::string& caption, bool drawn = false) {
   return fmt::format(
       "<figure><img loading=\"lazy\" width=\"{}\" height=\"{}\" alt=\"{}\" src=\"{}\">"
       "<figcaption>{}</figcaption></figure>\n",
-      picture.cols, picture.rows, Escaped(caption), DataUri(picture, ".jpg", "image/jpeg"),
+      picture.cols, picture.rows, Escaped(caption),
+      drawn ? DataUri(picture, ".png", "image/png") : DataUri(picture, ".jpg", "image/jpeg"),
       Escaped(caption));
 }
 
@@ -199,7 +202,7 @@ std::string RingHtml(const ReportInput& input) {
     caption += fmt::format(
         ", logged ones hollow; differences between both drawn {:g} times as long", ring.enlarged);
   if (!input.poses->free_directions.empty()) caption += "; dashed: axis of a free rotation";
-  return FigureHtml(ring.picture, caption + ".");
+  return FigureHtml(ring.picture, caption + ".", true);
 }
 
 Result<std::string> EllipsesHtml(const ReportInput& input, std::size_t index, const char* which) {
@@ -249,6 +252,37 @@ Result<std::string> CamerasHtml(const ReportInput& input) {
   return html + "</div>\n";
 }
 
+std::string PlotHtml(const Plot& plot, const std::string& caption) {
+  const cv::Mat picture = DrawPlot(plot, {kPlotWidePx, kPlotHighPx}).picture;
+  return picture.empty() ? "" : FigureHtml(picture, caption, true);
+}
+
+// How the solve went and what it rests on; empty where the method does not tell.
+std::string SolveHtml(const PoseDiagnostics& solve) {
+  std::string html = PlotHtml(
+      ConvergencePlot(solve),
+      fmt::format("The solve {} after {} iterations; the match window shrinks with the residuals.",
+                  solve.converged ? "converged" : "was ended", solve.steps.size()));
+  html += PlotHtml(CostPlot(solve),
+                   "Cost of each iteration's rig solve; it may rise, for matches and weights are "
+                   "found anew each time.");
+  html += PlotHtml(SpectrumPlot(solve.solve),
+                   "Eigenvalues of the information of all parameters in units of their prior's σ; "
+                   "least determined: " +
+                       LeastDetermined(solve.solve, 3) + ".");
+  std::string least;
+  for (const Spectrum& placing : solve.placings)
+    least +=
+        fmt::format("{}{}: {}", least.empty() ? "" : "; ", placing.of, LeastDetermined(placing, 1));
+  html += PlotHtml(PlacingPlot(solve.placings),
+                   "Eigenvalues of the information of the specimen's placing on the table, all "
+                   "else marginalised, turns counted as mm at its radius; least determined of " +
+                       least + ".");
+  return html.empty()
+             ? html
+             : "<h2>Convergence and information</h2>\n<div class=\"panels\">" + html + "</div>\n";
+}
+
 }  // namespace
 
 Status WriteReport(const std::filesystem::path& path, const ReportInput& input) {
@@ -270,7 +304,7 @@ Status WriteReport(const std::filesystem::path& path, const ReportInput& input) 
   html += FiguresTable(input.figures);
   html += "<h2>Texture</h2>\n" + AtlasHtml(input);
   SCAN_TRY(const std::string cameras, CamerasHtml(input));
-  html += "<h2>Cameras</h2>\n" + cameras;
+  html += "<h2>Cameras</h2>\n" + cameras + SolveHtml(input.poses->diagnostics);
   html += "<h2>Views</h2>\n";
   for (const auto& view : views) {
     if (!view) return tl::unexpected<Error>(view.error());
