@@ -16,6 +16,7 @@
 #include "firmware-host/cli/commands.h"
 #include "firmware-host/cli/demo_capture.h"
 #include "firmware-host/cli/evaluate_model.h"
+#include "firmware-host/cli/evaluate_sweep.h"
 #include "firmware-host/cli/figures.h"
 #include "firmware-host/cli/truth.h"
 #include "reconstruction/evaluate/fig12.h"
@@ -47,6 +48,8 @@ struct EvaluateOptions {
   std::size_t paper_faces = 12000;
   bool per_view = false;
   bool beads = false;
+  std::string sweep;  // empty: none
+  fs::path plot;
   fs::path out, from;
   bool force = false;
   EvaluateModelOptions model;
@@ -332,6 +335,28 @@ std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial)
   return text;
 }
 
+// Small and few where nothing else is asked for: a sweep solves many times.
+Result<CommandOutput> Sweep(EvaluateOptions& options, const CliContext& context) {
+  if (options.is_fig12())
+    return BadInput("the protocol of Fig 12 has no logged poses to sweep", "--sweep",
+                    "leave out --preset fig12");
+  if (options.views == 0) options.views = 8;
+  if (options.photo_width() == 0) options.width = 924;
+  SCAN_TRY(const Capture capture, MakeCapture(options, context));
+  SweepOptions sweep;
+  sweep.masks = {.noise = options.fig12.noise, .seed = options.fig12.seed};
+  sweep.joint = options.joint;
+  sweep.wrong_px = options.wrong_px;
+  SCAN_TRY(CommandOutput output,
+           RunSweep(capture.trial, options.sweep == "noise" ? SweepOf::noise : SweepOf::prior,
+                    sweep, options.plot, context));
+  options.method = "joint";
+  output.text = ProtocolText(options, capture.trial) + output.text;
+  output.json["specimen"] = options.specimen;
+  output.json["width"] = options.photo_width();
+  return output;
+}
+
 Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& context) {
   if (options.what != "poses") {
     options.model.model = options.what;
@@ -354,6 +379,7 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
     options.beads = options.specimen.ends_with("+beads");
     if (options.beads) options.specimen.resize(options.specimen.rfind("+beads"));
   }
+  if (!options.sweep.empty()) return Sweep(options, context);
   SCAN_TRY(const Capture capture, MakeCapture(options, context));
   const PoseTrial& trial = capture.trial;
   SCAN_TRY(const Evaluation evaluation, RunMethods(capture, options, context));
@@ -392,6 +418,17 @@ void AddStatedErrors(CLI::App& command, EvaluateOptions& options) {
       .add_option("--logged-sigma-mm", options.logged_sigma_mm,
                   "demo: stated sigma of each lift height; as logged if not given")
       ->check(CLI::Range(0.0, 100.0));
+}
+
+void AddSweep(CLI::App& command, EvaluateOptions& options) {
+  CLI::Option* sweep =
+      command
+          .add_option("--sweep", options.sweep,
+                      "demo: joint with the logged poses and without, for outlines that stray ever "
+                      "more (noise) or logged poses that are ever farther off (prior); 8 views, "
+                      "924 px wide if not given")
+          ->check(CLI::IsMember({"noise", "prior"}));
+  command.add_option("--plot", options.plot, "of a sweep: PNG to write")->needs(sweep);
 }
 
 }  // namespace
@@ -457,6 +494,7 @@ void AddEvaluate(CommandSet& commands) {
       ->excludes("--width")
       ->excludes("--full-size");
   AddStatedErrors(command, *options);
+  AddSweep(command, *options);
   command.add_option("--errors", options->errors, "of the simulated rig")
       ->check(CLI::IsMember({"ideal", "static", "dynamic"}))
       ->capture_default_str();
