@@ -102,7 +102,7 @@ std::optional<Range> RangeOf(const Plot& plot, int axis) {
   }
   const bool zero = shown.from_zero && !shown.log;
   if (zero) extend(0);
-  double margin = 0.05 * (range->high - range->low);
+  double margin = 0.08 * (range->high - range->low);
   if (margin <= 1e-9 * std::max(1.0, std::abs(range->high))) margin = shown.log ? 0.3 : 0.5;
   const bool at_zero = zero && range->low == 0;
   return Range{range->low - (at_zero && axis == 1 ? 0 : margin), range->high + margin};
@@ -110,6 +110,10 @@ std::optional<Range> RangeOf(const Plot& plot, int axis) {
 
 std::string TickText(double value, bool log) {
   const double v = log ? std::pow(10, value) : value;
+  if (log && (v > 9000 || v < 1e-3)) {
+    const double power = std::floor(value + 1e-9);
+    return fmt::format("{:.0f}e{:.0f}", std::pow(10, value - power), power);
+  }
   if (std::abs(v) >= 1e5 || (v != 0 && std::abs(v) < 1e-3)) return fmt::format("{:.0e}", v);
   return fmt::format("{:.6g}", std::abs(v) < 1e-12 ? 0.0 : v);
 }
@@ -251,11 +255,10 @@ void PlotDrawing::DrawSeries(std::size_t index) {
       Mark(picture_, at, index, ink);
     before = at;
     if (i < series.labels.size() && !series.labels[i].empty()) {
-      const cv::Size size = SizeOf(series.labels[i]);
-      const bool fits = at.x() + 9 + size.width < right();
-      Write(picture_,
-            {static_cast<int>(at.x()) + (fits ? 9 : -9 - size.width), static_cast<int>(at.y()) + 5},
-            series.labels[i], ink);
+      const int half = SizeOf(series.labels[i]).width / 2;
+      const int x = std::clamp(static_cast<int>(at.x()) - half, static_cast<int>(left()) + 2,
+                               static_cast<int>(right()) - 2 * half - 2);
+      Write(picture_, {x, static_cast<int>(at.y()) - 8}, series.labels[i], ink);
     }
   }
 }

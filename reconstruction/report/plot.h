@@ -20,7 +20,7 @@ struct PlotSeries {
   std::string name;                        // in the legend; none when empty
   std::vector<Eigen::Vector2d> points;     // not finite ones interrupt the line
   Style style = Style::line;
-  std::vector<std::string> labels = {};  // of the first points, beside them
+  std::vector<std::string> labels = {};  // of the first points, above them
 };
 
 // A thin line across the plot, at y or at x.

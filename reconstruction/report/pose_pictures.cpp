@@ -156,8 +156,15 @@ void DrawCamera(cv::Mat& picture, const ParallelView& view, const RingCamera& ca
   const Vector2d tip = view(*DrawnCentre(camera, enlarged) + arrow_mm * camera.forward);
   Line(picture, at, tip, colour);
   cv::circle(picture, Fixed(at), 3 << kShift, colour, cv::FILLED, cv::LINE_AA, kShift);
-  const Vector2d outward = at - tip;
-  const Vector2d beside = outward.norm() > 1 ? Vector2d(outward.normalized() * 14) : Vector2d(9, 9);
+  // Behind the camera and away from its nominal mark.
+  Vector2d outward = at - tip;
+  if (outward.norm() > 1) outward.normalize();
+  if (camera.nominal) {
+    const Vector2d apart = at - view(*camera.nominal);
+    if (apart.norm() > 1) outward += 1.2 * apart.normalized();
+  }
+  const Vector2d beside =
+      outward.norm() > 0.1 ? Vector2d(outward.normalized() * 14) : Vector2d(9, 9);
   Text(picture, at + beside + Vector2d(-6, 4), camera.label, kInk);
 }
 

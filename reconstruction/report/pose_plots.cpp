@@ -75,11 +75,16 @@ Plot PlacingPlot(const std::vector<Spectrum>& placings) {
     const double shift = placings.size() < 2 ? 0 : 0.1 * static_cast<double>(plot.series.size());
     for (Eigen::Vector2d& point : series.points) point.x() += shift;
     if (placings.size() == 1)
-      for (const SpectrumLine& line : placing.lines)
-        series.labels.push_back(fmt::format("{} ({:.0f} %)", line.parameter, 100 * line.share));
+      for (const SpectrumLine& line : placing.lines) series.labels.push_back(line.parameter);
     plot.series.push_back(std::move(series));
   }
   return plot;
+}
+
+std::size_t HardlyInformed(const Spectrum& solve) {
+  return static_cast<std::size_t>(
+      std::count_if(solve.lines.begin(), solve.lines.end(),
+                    [](const SpectrumLine& line) { return line.eigenvalue < 2; }));
 }
 
 std::string LeastDetermined(const Spectrum& spectrum, std::size_t count) {

@@ -20,6 +20,9 @@ Plot SpectrumPlot(const Spectrum& solve);
 // Eigenvalues of each mounting's placing, each labelled with what it mostly is.
 Plot PlacingPlot(const std::vector<Spectrum>& placings);
 
+// Directions of which the evidence says less than the prior: eigenvalues below 2.
+std::size_t HardlyInformed(const Spectrum& solve);
+
 // The parameters that the smallest `count` eigenvalues mostly are; empty when there are none.
 std::string LeastDetermined(const Spectrum& spectrum, std::size_t count);
 

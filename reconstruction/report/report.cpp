@@ -205,28 +205,49 @@ std::string RingHtml(const ReportInput& input) {
   return FigureHtml(ring.picture, caption + ".", true);
 }
 
-Result<std::string> EllipsesHtml(const ReportInput& input, std::size_t index, const char* which) {
+struct EllipsePicture {
+  cv::Mat photo;
+  std::vector<SurfaceEllipse> ellipses;  // in its pixels
+};
+
+Result<EllipsePicture> EllipsesOf(const ReportInput& input, std::size_t index) {
   const ViewPose& view = input.poses->views[index];
   const Photo& photo = input.photos->photos[index];
-  cv::Mat picture =
+  const cv::Mat picture =
       cv::imread(photo.path.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (picture.empty())
     return BadInput("cannot read the photograph", photo.path.string(), "check the file");
   const Intrinsics& intrinsics = IntrinsicsOf(*input.poses, view, input.photos->intrinsics(photo));
   const cv::Mat& mask = input.masks[index].coverage;
   const Crop crop = CropAround(mask, mask, kPanelPx);
-  std::vector<SurfaceEllipse> ellipses = SurfaceEllipses(input.atlas->mesh, view, intrinsics, 8);
-  if (ellipses.empty()) return std::string();
-  for (SurfaceEllipse& e : ellipses) {
+  EllipsePicture drawn{CropOf(picture, crop),
+                       SurfaceEllipses(input.atlas->mesh, view, intrinsics, 8)};
+  for (SurfaceEllipse& e : drawn.ellipses) {
     e.centre_px = crop.scale * (e.centre_px - Eigen::Vector2d(crop.full_px.x, crop.full_px.y));
     e.covariance_px2 *= crop.scale * crop.scale;
   }
-  const double factor = EllipseFactor(ellipses, kPanelPx / 40.0);
-  return FigureHtml(
-      DrawEllipses(CropOf(picture, crop), ellipses, factor),
-      fmt::format("{}, the {} determined view: 1 σ of points of the surface, drawn {:g} times as "
-                  "large (median {:.3f} px, full size)",
-                  view.name, which, factor, view.surface_sigma_px.median));
+  return drawn;
+}
+
+// `index` of the views, best determined first, least last; enlarged alike so that they compare.
+Result<std::string> EllipsesHtml(const ReportInput& input, const std::vector<std::size_t>& index) {
+  std::vector<EllipsePicture> drawn;
+  for (const std::size_t i : index) {
+    SCAN_TRY(EllipsePicture picture, EllipsesOf(input, i));
+    drawn.push_back(std::move(picture));
+  }
+  const double factor = drawn.empty() ? 1 : EllipseFactor(drawn.back().ellipses, kPanelPx / 30.0);
+  std::string html;
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    const ViewPose& view = input.poses->views[index[k]];
+    html += FigureHtml(
+        DrawEllipses(drawn[k].photo, drawn[k].ellipses, factor),
+        fmt::format("{}, the {} determined view: 1 σ of points of the surface, drawn {:g} times as "
+                    "large (median {:.3f} px, full size).",
+                    view.name, k + 1 == drawn.size() ? "least" : "best", factor,
+                    view.surface_sigma_px.median));
+  }
+  return html;
 }
 
 // Where the cameras stand and how well that is known.
@@ -241,14 +262,11 @@ Result<std::string> CamerasHtml(const ReportInput& input) {
     if (!best || sigma(i) < sigma(*best)) best = i;
     if (!worst || sigma(i) > sigma(*worst)) worst = i;
   }
-  if (best) {
-    SCAN_TRY(const std::string ellipses, EllipsesHtml(input, *best, "best"));
-    html += ellipses;
-  }
-  if (worst && worst != best) {
-    SCAN_TRY(const std::string ellipses, EllipsesHtml(input, *worst, "least"));
-    html += ellipses;
-  }
+  std::vector<std::size_t> shown;
+  if (best && best != worst) shown.push_back(*best);
+  if (worst) shown.push_back(*worst);
+  SCAN_TRY(const std::string ellipses, EllipsesHtml(input, shown));
+  html += ellipses;
   return html + "</div>\n";
 }
 
@@ -266,10 +284,12 @@ std::string SolveHtml(const PoseDiagnostics& solve) {
   html += PlotHtml(CostPlot(solve),
                    "Cost of each iteration's rig solve; it may rise, for matches and weights are "
                    "found anew each time.");
-  html += PlotHtml(SpectrumPlot(solve.solve),
-                   "Eigenvalues of the information of all parameters in units of their prior's σ; "
-                   "least determined: " +
-                       LeastDetermined(solve.solve, 3) + ".");
+  html +=
+      PlotHtml(SpectrumPlot(solve.solve),
+               fmt::format("Eigenvalues of the information of all parameters in units of their "
+                           "prior's σ; of {} directions the photographs say less than the prior "
+                           "in {}.",
+                           solve.solve.lines.size(), HardlyInformed(solve.solve)));
   std::string least;
   for (const Spectrum& placing : solve.placings)
     least +=

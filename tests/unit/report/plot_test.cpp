@@ -109,10 +109,12 @@ TEST(PosePlots, ShowEveryStepAndWhereTheSolveBeganAgain) {
 TEST(PosePlots, NameWhatIsLeastDetermined) {
   EXPECT_EQ(LeastDetermined(Solve().solve, 2), "v1 lift (1), mask bias (40)");
   EXPECT_EQ(LeastDetermined({}, 2), "");
+  EXPECT_EQ(HardlyInformed(Solve().solve), 1u);
+  EXPECT_EQ(HardlyInformed({}), 0u);
   EXPECT_EQ(SpectrumPlot(Solve().solve).series[0].points[2], Vector2d(3, 1e6));
   const Plot placing = PlacingPlot(Solve().placings);
   ASSERT_EQ(placing.series.size(), 1u);
-  EXPECT_EQ(placing.series[0].labels[0], "turn z (98 %)");
+  EXPECT_EQ(placing.series[0].labels[0], "turn z");
   EXPECT_TRUE(DrawPlot(PlacingPlot({}), {480, 300}).picture.empty());
 }
 
