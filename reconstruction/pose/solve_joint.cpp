@@ -366,13 +366,16 @@ std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
   for (std::size_t i = 0; i < agree.size(); ++i)
     agree[i] = agree[i] && judgements[i].reason.empty();
   const bool some = std::find(agree.begin(), agree.end(), true) != agree.end();
-  // Samples twice as dense, once all is near its place: the orchid's poses come nearer to the
-  // Cramer-Rao bound by 6 % (924 x 612).
-  again.spacing_px = 0.5 * in.refine.spacing_px;
-  if (agree == attempt.use) again.first_window_px = in.refine.last_window_px;
-  fit = Continued(fit, RefineJoint(in.mesh, rig, in.photos, some ? agree : attempt.use,
-                                   fit.parameters, again, stop));
-  judgements = Judge(in, rig, fit);
+  // A view without a logged pose rests on its own outline alone: with samples twice as dense the
+  // orchid's come nearer to the Cramer-Rao bound by 6 % (924 x 612).
+  const bool alone = std::none_of(rig.views().begin(), rig.views().end(),
+                                  [](const RigView& view) { return view.logged; });
+  if (alone) again.spacing_px = 0.5 * in.refine.spacing_px;
+  if (alone || (some && agree != attempt.use)) {
+    fit = Continued(fit, RefineJoint(in.mesh, rig, in.photos, some ? agree : attempt.use,
+                                     fit.parameters, again, stop));
+    judgements = Judge(in, rig, fit);
+  }
   RejectRefutedScale(in, rig, attempt.use, fit.parameters, fit.fits, judgements, stop);
   RejectViewsAlone(in, rig, fit.parameters, attempt.changes, judgements);
   return judgements;

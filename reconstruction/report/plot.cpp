@@ -313,6 +313,11 @@ std::vector<double> LogTicks(double low, double high, int count) {
       const double tick = k + std::log10(factor);
       if (tick >= low - kSlack && tick <= high + kSlack) ticks.push_back(tick);
     }
+  if (ticks.size() >= 2) return ticks;
+  // Less than a step of these: linear ones.
+  ticks.clear();
+  for (const double tick : LinearTicks(std::pow(10, low), std::pow(10, high), count, false))
+    ticks.push_back(std::log10(tick));
   return ticks;
 }
 

@@ -58,7 +58,8 @@ DrawnPlot DrawPlot(const Plot& plot, cv::Size size);
 
 // Round numbers within [low, high], at most about `count`. Linear: steps of 1, 2 or 5 times a power
 // of ten. Logarithmic (low and high are logarithms of base ten, as is what is returned): powers of
-// ten, with twice and five times as much in between where these are few.
+// ten, with twice and five times as much in between where these are few, linear ones where even
+// those are less than two.
 std::vector<double> LinearTicks(double low, double high, int count, bool whole);
 std::vector<double> LogTicks(double low, double high, int count);
 

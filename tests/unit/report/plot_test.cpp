@@ -34,6 +34,9 @@ TEST(Ticks, StandAtRoundNumbers) {
   const auto fine = LogTicks(-0.1, 1.1, 8);  // 1, 2, 5, 10
   ASSERT_EQ(fine.size(), 4u);
   EXPECT_NEAR(fine[1], std::log10(2), 1e-12);
+  const auto narrow = LogTicks(std::log10(0.93), std::log10(1.31), 8);
+  ASSERT_GE(narrow.size(), 4u);
+  EXPECT_NEAR(std::pow(10, narrow.front()), 0.95, 1e-9);
   EXPECT_TRUE(LinearTicks(1, 1, 5, false).empty());
   EXPECT_TRUE(LogTicks(0, kNotANumber, 5).empty());
 }
