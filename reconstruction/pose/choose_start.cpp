@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "reconstruction/pose/centred_views.h"
 #include "reconstruction/pose/outline_distance.h"
 #include "reconstruction/pose/rigid_motion.h"
 
@@ -33,8 +34,9 @@ Refined RefineFrom(const ContourMesh& mesh, RigModel& rig, int mounting,
                    const std::vector<bool>& use, const RefineOptions& options, double clip_px,
                    std::stop_token stop) {
   rig.set_start(mounting, start);
-  const RefineResult fit =
-      RefineJoint(mesh, rig, photos, use, rig.Nominal(), options, std::move(stop));
+  const RefineResult fit = RefineJoint(
+      mesh, rig, photos, use, CentredViews(mesh, rig, photos, use, options.centre_beyond_px),
+      options, std::move(stop));
   return {rig.TableFromModelOf(fit.parameters, mounting),
           MeanOutlineDistance(mesh, rig, fit.parameters, photos, use, clip_px, options.spacing_px)};
 }

@@ -20,6 +20,8 @@ struct RefineOptions {
   double first_window_px = 64;  // search along the normal; shrinks with the residuals
   double last_window_px = 8;
   double spacing_px = 4;  // of contour samples
+  // A view whose stated sigma moves its image by more starts from its silhouette's centroid.
+  double centre_beyond_px = 16;
   // Contour that counts as one independent observation is estimated from the residuals of all
   // views, and is at least this: real residuals are model discrepancy.
   double correlation_floor_px = 43;

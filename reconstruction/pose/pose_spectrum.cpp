@@ -77,7 +77,9 @@ Spectrum SpectrumOf(const std::string& of, const Eigen::MatrixXd& information,
 }
 
 Spectrum SolveSpectrum(const PhotoSet& photos, const RigModel& rig, const RefineResult& fit) {
+  constexpr int kMostParameters = 600;
   const RigLayout layout(rig);
+  if (layout.size > kMostParameters) return {"solve", {}};
   std::vector<std::optional<CondensedEvidence>> evidence;
   for (const ViewFit& view : fit.fits) evidence.push_back(view.evidence);
   const auto scale = PriorSigmas(rig, layout).eval();

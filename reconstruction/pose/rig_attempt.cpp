@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "reconstruction/pose/centred_views.h"
 #include "reconstruction/pose/choose_start.h"
 #include "reconstruction/pose/outline_distance.h"
 
@@ -34,7 +35,9 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
   RigAttempt attempt{nominal, {}, {}, in.use, false, 0};
   RigModel& rig = attempt.rig;
   SCAN_CHECK(ChooseStarts(in.mesh, rig, in.photos, in.use, in.known, in.search, in.refine, stop));
-  attempt.fit = RefineJoint(in.mesh, rig, in.photos, in.use, rig.Nominal(), in.refine, stop);
+  const RigParameters start =
+      CentredViews(in.mesh, rig, in.photos, in.use, in.refine.centre_beyond_px);
+  attempt.fit = RefineJoint(in.mesh, rig, in.photos, in.use, start, in.refine, stop);
   const RigAttempt plain = attempt;
   for (int round = 0; round < kRounds && AnyLogged(rig) && !stop.stop_requested(); ++round) {
     RigParameters parameters = attempt.fit.parameters;

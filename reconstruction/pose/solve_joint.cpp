@@ -26,6 +26,7 @@ RefineOptions ScaledTo(RefineOptions options, double scale) {
   // their size, and samples 8 px apart would leave half of it unused.
   options.spacing_px = std::max(2.0, options.spacing_px * std::min(1.0, scale));
   options.correlation_floor_px *= scale;
+  options.centre_beyond_px *= scale;
   return options;
 }
 
