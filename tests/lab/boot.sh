@@ -18,6 +18,15 @@ dir=$here
 [ -z "$root" ] || dir=/src/tests/lab
 printf 'LAB_DIR=%q\nLAB_BIN=%q\nLAB_SCENE=%q\n' "$dir" "$bin" "$(dirname "$(dirname "$run")")/scene" >"$run/environment"
 
+# Waiting for a file of the host is waiting too, and the guest's time jumps meanwhile: a program that the
+# host's disk is slow to give would be late for every timer. What the suites load is therefore read once
+# before anything runs against the clock.
+within() { if [ -n "$root" ]; then chroot "$root" "$@"; else "$@"; fi; }
+within sh -c 'for program in "$1"/lab_* "$1"/scanstation?*; do echo "$program"; ldd "$program"; done 2>/dev/null |
+    grep -o "/[^ ]*"
+  find /usr/lib/*-linux-gnu/libgphoto2* /usr/lib/*-linux-gnu/libcamera -name "*.so*" 2>/dev/null || true' sh "$bin" |
+  sort -u >"$run/loaded"
+
 # The guest's processor is emulated, so nothing depends on what the host can virtualise, and its time
 # counts instructions (4 ns each; while it sleeps it jumps to the next timer): what a suite sees does not
 # depend on how busy the host is, and waiting costs nothing. One processor: with more the guest's would
