@@ -135,20 +135,20 @@ Errors ErrorsOf(const PeerScene& scene, const PeerPoses& found, const Eigen::Mat
   return errors;
 }
 
-// Of the camera centres; identity for fewer than three.
-Eigen::Matrix4d SimilarityOf(const PeerScene& scene, const PeerPoses& found) {
+// Of the camera centres; none for fewer than three.
+std::optional<Eigen::Matrix4d> SimilarityOf(const PeerScene& scene, const PeerPoses& found) {
   std::vector<Eigen::Vector3d> from, to;
   for (std::size_t i = 0; i < found.poses.size(); ++i) {
     if (!found.poses[i]) continue;
     from.push_back(CameraCentre(*found.poses[i]));
     to.push_back(CameraCentre(scene.trial.truth[i].camera_from_model));
   }
-  if (from.size() < 3) return Eigen::Matrix4d::Identity();
+  if (from.size() < 3) return std::nullopt;
   const auto matrix = [](const std::vector<Eigen::Vector3d>& points) {
     return Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3,
                                               static_cast<Eigen::Index>(points.size()));
   };
-  return Eigen::umeyama(matrix(from), matrix(to), true);
+  return Eigen::Matrix4d(Eigen::umeyama(matrix(from), matrix(to), true));
 }
 
 std::string Cell(const std::vector<double>& values) {
@@ -160,11 +160,15 @@ std::string Cell(const std::vector<double>& values) {
 void PrintRow(const PeerScene& scene, const PeerPoses& found) {
   const bool comparable = scene.same_frame && !found.own_scale;
   const Errors own = comparable ? ErrorsOf(scene, found, Eigen::Matrix4d::Identity()) : Errors{};
-  const Errors aligned = ErrorsOf(scene, found, SimilarityOf(scene, found));
-  fmt::print("| {} | {} of {} | {} | {} | {} | {} | {:.1f} / {:.1f} |{}{}\n", found.method,
-             aligned.centre_mm.size(), found.poses.size(), Cell(own.rotation_deg),
-             Cell(own.centre_mm), Cell(aligned.rotation_deg), Cell(aligned.centre_mm),
-             found.seconds, found.processor_seconds, found.remark.empty() ? "" : " ", found.remark);
+  const auto similarity = SimilarityOf(scene, found);
+  const Errors aligned = similarity ? ErrorsOf(scene, found, *similarity) : Errors{};
+  const auto solved =
+      found.poses.size() -
+      static_cast<std::size_t>(std::count(found.poses.begin(), found.poses.end(), std::nullopt));
+  fmt::print("| {} | {} of {} | {} | {} | {} | {} | {:.1f} / {:.1f} |{}{}\n", found.method, solved,
+             found.poses.size(), Cell(own.rotation_deg), Cell(own.centre_mm),
+             Cell(aligned.rotation_deg), Cell(aligned.centre_mm), found.seconds,
+             found.processor_seconds, found.remark.empty() ? "" : " ", found.remark);
   std::fflush(stdout);
 }
 
