@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <optional>
 
+#include "reconstruction/pose/found_turntable.h"
 #include "reconstruction/pose/joint_result.h"
+#include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/pose/observability.h"
 #include "reconstruction/pose/outline_distance.h"
 #include "reconstruction/pose/picture_cost.h"
@@ -408,13 +410,10 @@ Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask>
   return poses;
 }
 
-}  // namespace
-
-Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
-                         std::span<const Mask> masks, const JointOptions& options,
-                         const ProgressFn& progress, std::stop_token stop) {
-  SCAN_CHECK(CheckPoseInput(mesh, given, masks));
-  const PhotoSet photos = options.no_priors ? WithoutPoses(given) : given;
+// With the poses that `photos` log. Precondition: as CheckPoseInput.
+Result<Poses> Solve(const TriangleMesh& mesh, const PhotoSet& photos, std::span<const Mask> masks,
+                    const JointOptions& options, const ProgressFn& progress,
+                    const std::stop_token& stop) {
   RigModel rig(photos, options.rig);
   if (!options.bead_findings.beads.empty() &&
       options.bead_findings.images.size() != photos.photos.size())
@@ -455,6 +454,51 @@ Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
   for (std::size_t i = 0; i < alternatives.size(); ++i)
     poses.views[i].alternatives = alternatives[i];
   return poses;
+}
+
+int Accepted(const Poses& poses) {
+  return static_cast<int>(
+      std::count_if(poses.views.begin(), poses.views.end(),
+                    [](const ViewPose& view) { return view.status == ViewStatus::accepted; }));
+}
+
+// Photographs that were each found alone, solved as one camera's before a turntable where their
+// poses say so: views then share what each alone knows less well.
+Result<Poses> SolveOnFoundTurntable(const TriangleMesh& mesh, const PhotoSet& photos,
+                                    std::span<const Mask> masks, const JointOptions& options,
+                                    Poses alone, const ProgressFn& progress,
+                                    const std::stop_token& stop) {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    centre += vertex / static_cast<double>(mesh.vertices.size());
+  const auto found = FindTurntable(photos, alone, centre);
+  if (!found) return alone;
+  JointOptions again = options;
+  for (const Photo& photo : found->photos.photos)
+    again.table_from_model[photo.mounting_id] = found->table_from_model;
+  SCAN_TRY(Poses together, Solve(mesh, found->photos, masks, again, progress, stop));
+  if (Accepted(together) < Accepted(alone)) return alone;
+  together.notes.insert(
+      together.notes.begin(),
+      fmt::format("The poses of {} of {} views, each found alone, are those of one camera before a "
+                  "specimen that turns about one axis: they were solved together as such.",
+                  found->views, photos.photos.size()));
+  return together;
+}
+
+}  // namespace
+
+Result<Poses> SolveJoint(const TriangleMesh& mesh, const PhotoSet& given,
+                         std::span<const Mask> masks, const JointOptions& options,
+                         const ProgressFn& progress, std::stop_token stop) {
+  SCAN_CHECK(CheckPoseInput(mesh, given, masks));
+  const PhotoSet photos = options.no_priors ? WithoutPoses(given) : given;
+  SCAN_TRY(Poses poses, Solve(mesh, photos, masks, options, progress, stop));
+  const bool logged = std::any_of(
+      photos.photos.begin(), photos.photos.end(),
+      [&](const Photo& photo) { return NominalCameraFromTable(photos, photo).has_value(); });
+  if (logged) return poses;
+  return SolveOnFoundTurntable(mesh, photos, masks, options, std::move(poses), progress, stop);
 }
 
 }  // namespace scan
