@@ -48,6 +48,7 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
       if (change.kind == RigChange::Kind::view_alone)
         attempt.use[static_cast<std::size_t>(change.view)] = false;
     attempt.changes.insert(attempt.changes.end(), found.begin(), found.end());
+    RemoveContained(attempt.changes);
     RefineOptions again = in.refine;
     again.first_window_px = 2 * in.refine.last_window_px;
     attempt.fit = Continued(

@@ -127,6 +127,18 @@ std::vector<int> TakenSince(const RigModel& rig, const std::vector<ViewTerms>& t
   return after;
 }
 
+// Whether the views are all of a mounting: a turn of these is one of its placing.
+bool IsWholeMounting(const RigModel& rig, const std::vector<ViewTerms>& terms,
+                     const std::vector<int>& views) {
+  const int mounting = rig.views()[views.front()].mounting;
+  std::size_t members = 0;
+  for (std::size_t k = 0; k < terms.size(); ++k)
+    members += terms[k].used && rig.views()[k].mounting == mounting;
+  return members == views.size() && std::all_of(views.begin(), views.end(), [&](int k) {
+           return rig.views()[k].mounting == mounting;
+         });
+}
+
 RigChange Better(const RigChange& a, const RigChange& b) { return b.gain > a.gain ? b : a; }
 
 }  // namespace
@@ -184,7 +196,7 @@ std::optional<RigChange> MostLikelyChange(const RigModel& rig, const RigEvidence
     const auto turned = TakenSince(rig, terms, i, [&](int k) {
       return rig.views()[k].turns && rig.views()[k].epoch == view.epoch;
     });
-    if (view.turns && !turned.empty())
+    if (view.turns && !turned.empty() && !IsWholeMounting(rig, terms, turned))
       steps = Better(steps, {RigChange::Kind::steps_lost, i,
                              test.Gain(turned, 1, [&](const ViewTerms& t) -> ChangeColumns {
                                return t.by_angle * options.steps_sigma_rad;
@@ -211,6 +223,16 @@ std::optional<RigChange> MostLikelyChange(const RigModel& rig, const RigEvidence
   return std::nullopt;
 }
 
+void RemoveContained(std::vector<RigChange>& changes) {
+  const std::vector<RigChange> all = changes;
+  std::erase_if(changes, [&](const RigChange& steps) {
+    return steps.kind == RigChange::Kind::steps_lost &&
+           std::any_of(all.begin(), all.end(), [&](const RigChange& moved) {
+             return moved.kind == RigChange::Kind::specimen_moved && moved.view == steps.view;
+           });
+  });
+}
+
 std::vector<RigChange> FindChanges(const ContourMesh& mesh, RigModel& rig,
                                    std::span<const PhotoContour> photos,
                                    const std::vector<bool>& use, const RefineOptions& refine,
@@ -231,6 +253,9 @@ std::vector<RigChange> FindChanges(const ContourMesh& mesh, RigModel& rig,
                        parameters);
         break;
       case RigChange::Kind::specimen_moved:
+        // A new placing also holds what a new offset from there on would: that one goes.
+        if (const std::string& epoch = rig.epoch_names()[view.epoch]; epoch.ends_with(from))
+          rig.JoinEpoch(view.epoch, epoch.substr(0, epoch.size() - from.size()), parameters);
         rig.SplitMounting(change->view, rig.mounting_ids()[view.mounting] + from, parameters);
         break;
       case RigChange::Kind::view_alone:
@@ -239,6 +264,7 @@ std::vector<RigChange> FindChanges(const ContourMesh& mesh, RigModel& rig,
     }
     changes.push_back(*change);
   }
+  RemoveContained(changes);
   return changes;
 }
 

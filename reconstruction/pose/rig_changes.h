@@ -50,6 +50,10 @@ std::optional<RigChange> MostLikelyChange(const RigModel& rig, const RigEvidence
                                           const RigParameters& parameters, double cost,
                                           const ChangeOptions& options);
 
+// Leaves out lost steps from a view on from which the specimen is also found to stand elsewhere:
+// its new placing holds the turn too, and nothing tells the two apart.
+void RemoveContained(std::vector<RigChange>& changes);
+
 // Finds the changes one after the other, most telling first, and gives the rig what describes each:
 // a new offset of the turntable or a new placing. A view that stands alone is only named; it should
 // take no further part. `parameters` receives those that the changed rig starts from.

@@ -1,6 +1,7 @@
 #include "reconstruction/pose/rig_model.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numeric>
 
@@ -88,6 +89,19 @@ void RigModel::SplitEpoch(int first_view, const std::string& name, double sigma_
   const int since = views_[static_cast<std::size_t>(first_view)].taken;
   for (RigView& view : views_)
     if (view.epoch == before && view.taken >= since) view.epoch = after;
+}
+
+void RigModel::JoinEpoch(int epoch, const std::string& into, RigParameters& parameters) {
+  const auto found = std::find(epoch_names_.begin(), epoch_names_.end(), into);
+  assert(found != epoch_names_.end() && epoch_names_[static_cast<std::size_t>(epoch)] != into);
+  const int before = static_cast<int>(found - epoch_names_.begin());
+  for (RigView& view : views_) {
+    if (view.epoch == epoch) view.epoch = before;
+    if (view.epoch > epoch) --view.epoch;
+  }
+  epoch_names_.erase(epoch_names_.begin() + epoch);
+  epoch_sigma_rad_.erase(epoch_sigma_rad_.begin() + epoch);
+  parameters.epochs.erase(parameters.epochs.begin() + epoch);
 }
 
 void RigModel::SplitMounting(int first_view, const std::string& id, RigParameters& parameters) {

@@ -71,5 +71,18 @@ TEST(EvidenceOfViewsAlone, AMovedBodyIsFoundWhereItIs) {
   }
 }
 
+TEST(RigChanges, LostStepsAtAViewWhereTheSpecimenMovedSayNothingMore) {
+  using Kind = RigChange::Kind;
+  std::vector<RigChange> changes{{Kind::steps_lost, 4},
+                                 {Kind::steps_lost, 7},
+                                 {Kind::view_alone, 4},
+                                 {Kind::specimen_moved, 7}};
+  RemoveContained(changes);
+  ASSERT_EQ(changes.size(), 3u);
+  EXPECT_EQ(changes[0].view, 4);
+  EXPECT_EQ(changes[1].kind, Kind::view_alone);
+  EXPECT_EQ(changes[2].kind, Kind::specimen_moved);
+}
+
 }  // namespace
 }  // namespace scan

@@ -158,6 +158,25 @@ TEST(RigFaults, NothingIsFoundWhereNothingIsWrong) {
   EXPECT_TRUE(outcome.Rejected().empty());
 }
 
+// Steps lost at v006, the specimen moved at v015, and the mask of v020 is another view's.
+TEST(RigFaults, SeveralAtOnceAreToldApart) {
+  test::SceneFaults faults;
+  faults.steps_lost_from = 6;
+  faults.steps_lost_rad = RadFromDeg(1.8);
+  faults.moved_from = 15;
+  faults.moved << RadFromDeg(2) * Eigen::Vector3d(0.6, 0, 0.8), 0.2, 0.3, 0;
+  const Outcome outcome =
+      SolveBug(faults, true, [](test::Scene& scene) { scene.masks[20] = scene.masks[3]; });
+  ASSERT_EQ(outcome.Rejected(), std::vector<int>{20}) << outcome.Notes();
+  EXPECT_NEAR(NumberAfter(outcome.Notes(), "From view v006 on the turntable stands "), -1.8, 0.2);
+  EXPECT_TRUE(Says(outcome.Notes(), "Between views v014 and v015 the specimen moved"));
+  EXPECT_NEAR(NumberAfter(outcome.Notes(), "it turned by "), 2, 0.15);
+  EXPECT_EQ(outcome.poses.notes.size(), 2u) << outcome.Notes();
+  ExpectNotSpread(outcome, WithoutFault(), {20});
+  std::cout << outcome.Notes() << outcome.RmsOf({20}) << " px RMS, worst " << outcome.WorstOf({20})
+            << "\n";
+}
+
 TEST(RigFaults, LostStepsFromViewNineOn) {
   test::SceneFaults faults;
   faults.steps_lost_from = 9;

@@ -50,6 +50,28 @@ TEST(RigModel, NominalParametersGiveTheLoggedPoses) {
   }
 }
 
+TEST(RigModel, ASplitThatIsTakenBackLeavesNothing) {
+  Rigged r = SomeRig();
+  const RigModel before = r.rig;
+  const RigParameters parameters = r.parameters;
+  r.rig.SplitEpoch(1, "1-from-b", 0.3, r.parameters);
+  r.rig.SplitEpoch(3, "1-from-d", 0.3, r.parameters);
+  r.parameters.epochs.back() += 0.1;
+  r.rig.JoinEpoch(1, "1", r.parameters);
+  EXPECT_EQ(r.rig.epoch_names(), (std::vector<std::string>{"1", "1-from-d"}));
+  ASSERT_EQ(r.parameters.epochs.size(), 2u);
+  EXPECT_EQ(r.parameters.epochs.back(), parameters.epochs.front() + 0.1);
+  for (int i = 0; i < 4; ++i) {
+    const double moved = (r.rig.CameraFromModelOf(r.parameters, i).matrix34() -
+                          before.CameraFromModelOf(parameters, i).matrix34())
+                             .norm();
+    if (i < 3)
+      EXPECT_EQ(moved, 0) << i;
+    else
+      EXPECT_GT(moved, 0.01);
+  }
+}
+
 TEST(RigModel, CtScaleIsDividedOutOfTheTranslation) {
   Rigged r = SomeRig();
   r.parameters.log_ct_scale = 0;
