@@ -17,12 +17,12 @@ struct FoundTurntable {
   int views = 0;  // that stand on it
 };
 
-// Looks for one axis that all accepted views turn about: `poses` of photographs that were each found
-// alone, `centre` of the mesh in the model frame. Views without a free direction decide: they stand
-// on it when what is left of each is within what its own covariance allows, for three quarters of
-// them. A view with a free direction belongs to it when it is off by less than 5 degrees. None for
-// fewer than six that decide, for turns that do not span 30 degrees and for views of several aims
-// or mountings.
+// Looks for one axis that all accepted views turn about: `poses` of photographs that were each
+// found alone, `centre` of the mesh in the model frame. Views without a free direction decide: they
+// stand on it when what is left of each is within what its own covariance allows, for three
+// quarters of them. A view with a free direction belongs to it when it is off by less than 5
+// degrees. None for fewer than six that decide, for turns that do not span 30 degrees and for views
+// of several aims or mountings.
 std::optional<FoundTurntable> FindTurntable(const PhotoSet& photos, const Poses& poses,
                                             const Eigen::Vector3d& centre);
 
