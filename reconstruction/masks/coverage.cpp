@@ -64,55 +64,6 @@ cv::Mat ForegroundWeight(const cv::Mat& photo, const cv::Mat& background, const 
   return weight;
 }
 
-// The specimen's colour at its very edge: a round body lit from the camera's side darkens towards
-// its outline, so that the colour a few pixels inside would place the edge too far inside (by 1 px
-// and more: half of that colour is passed within the specimen). Colour against depth below the
-// labels' edge is fitted around each pixel and followed outwards to the edge, as the root of a
-// line: so falls the light on a ball. Only along the line from background to `inner`, and within
-// bounds.
-cv::Mat ForegroundAtEdge(const cv::Mat& photo, const cv::Mat& background, const cv::Mat& labels,
-                         const cv::Mat& inner, int inner_px) {
-  constexpr float kDeepest_px = 12, kRidge_px2 = 0.5f;
-  constexpr double kSigma_px = 3;
-  constexpr float kDarkest = 0.3f, kBrightest = 1.5f;
-  cv::Mat depth, sure, depths(labels.size(), CV_32FC3), weight(labels.size(), CV_32F);
-  cv::erode(labels, sure, Disk(inner_px), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
-  cv::distanceTransform(labels, depth, cv::DIST_L2, cv::DIST_MASK_5);
-  const cv::Mat squares = photo.mul(photo);
-  cv::Mat times_depth(labels.size(), CV_32FC3);
-  for (int y = 0; y < labels.rows; ++y) {
-    for (int x = 0; x < labels.cols; ++x) {
-      const float d = depth.at<float>(y, x);
-      weight.at<float>(y, x) = sure.at<uchar>(y, x) && d <= kDeepest_px ? 1.f : 0.f;
-      depths.at<cv::Vec3f>(y, x) = {d, d * d, 0};
-      times_depth.at<cv::Vec3f>(y, x) = squares.at<cv::Vec3f>(y, x) * d;
-    }
-  }
-  cv::Mat support;
-  const cv::Mat d = NearestMean(depths, weight, kSigma_px, &support);
-  const cv::Mat c = NearestMean(squares, weight, kSigma_px);
-  const cv::Mat dc = NearestMean(times_depth, weight, kSigma_px);
-  cv::Mat edge = inner.clone();
-  for (int y = 0; y < labels.rows; ++y) {
-    for (int x = 0; x < labels.cols; ++x) {
-      if (support.at<float>(y, x) <= 1e-6f) continue;
-      const cv::Vec3f mean = c.at<cv::Vec3f>(y, x), moments = d.at<cv::Vec3f>(y, x);
-      const float variance = moments[1] - moments[0] * moments[0];
-      const cv::Vec3f slope =
-          (dc.at<cv::Vec3f>(y, x) - moments[0] * mean) * (1 / (variance + kRidge_px2));
-      const cv::Vec3f b = background.at<cv::Vec3f>(y, x);
-      const cv::Vec3f axis = inner.at<cv::Vec3f>(y, x) - b;
-      const float length2 = axis.dot(axis);
-      if (length2 < 1e-5f) continue;
-      cv::Vec3f at_edge = mean - moments[0] * slope;
-      for (int k = 0; k < 3; ++k) at_edge[k] = std::sqrt(std::max(0.f, at_edge[k]));
-      const float share = (at_edge - b).dot(axis) / length2;
-      edge.at<cv::Vec3f>(y, x) = b + std::clamp(share, kDarkest, kBrightest) * axis;
-    }
-  }
-  return edge;
-}
-
 }  // namespace
 
 cv::Mat BackgroundFromPhoto(const cv::Mat& photo, const cv::Mat& labels, int margin_px) {
@@ -159,8 +110,7 @@ cv::Mat CoverageFromLabels(const cv::Mat& photo_linear, const cv::Mat& backgroun
   background += NearestMean(photo - background, off, 3);
 
   const cv::Mat weight = ForegroundWeight(photo, background, label, inner_px);
-  const cv::Mat foreground =
-      ForegroundAtEdge(photo, background, label, NearestMean(photo, weight, 2), inner_px);
+  const cv::Mat foreground = NearestMean(photo, weight, 2);
   for (int y = 0; y < out.rows; ++y) {
     for (int x = 0; x < out.cols; ++x) {
       if (!grown.at<uchar>(y, x) || shrunk.at<uchar>(y, x)) continue;

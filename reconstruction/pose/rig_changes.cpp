@@ -139,6 +139,17 @@ bool IsWholeMounting(const RigModel& rig, const std::vector<ViewTerms>& terms,
          });
 }
 
+// The epoch that one with this ending of its name was split from; none for any other.
+std::optional<int> EpochSplitFrom(const RigModel& rig, int epoch, const std::string& ending) {
+  const auto& names = rig.epoch_names();
+  const std::string& name = names[static_cast<std::size_t>(epoch)];
+  if (!name.ends_with(ending)) return std::nullopt;
+  const auto found =
+      std::find(names.begin(), names.begin() + epoch, name.substr(0, name.size() - ending.size()));
+  if (found == names.begin() + epoch) return std::nullopt;
+  return static_cast<int>(found - names.begin());
+}
+
 RigChange Better(const RigChange& a, const RigChange& b) { return b.gain > a.gain ? b : a; }
 
 }  // namespace
@@ -254,8 +265,8 @@ std::vector<RigChange> FindChanges(const ContourMesh& mesh, RigModel& rig,
         break;
       case RigChange::Kind::specimen_moved:
         // A new placing also holds what a new offset from there on would: that one goes.
-        if (const std::string& epoch = rig.epoch_names()[view.epoch]; epoch.ends_with(from))
-          rig.JoinEpoch(view.epoch, epoch.substr(0, epoch.size() - from.size()), parameters);
+        if (const auto before = EpochSplitFrom(rig, view.epoch, from))
+          rig.JoinEpoch(view.epoch, *before, parameters);
         rig.SplitMounting(change->view, rig.mounting_ids()[view.mounting] + from, parameters);
         break;
       case RigChange::Kind::view_alone:

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <string>
 
 #include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/pose/rig_chain.h"
@@ -91,14 +92,17 @@ void RigModel::SplitEpoch(int first_view, const std::string& name, double sigma_
     if (view.epoch == before && view.taken >= since) view.epoch = after;
 }
 
-void RigModel::JoinEpoch(int epoch, const std::string& into, RigParameters& parameters) {
-  const auto found = std::find(epoch_names_.begin(), epoch_names_.end(), into);
-  assert(found != epoch_names_.end() && epoch_names_[static_cast<std::size_t>(epoch)] != into);
-  const int before = static_cast<int>(found - epoch_names_.begin());
+void RigModel::JoinEpoch(int epoch, int into, RigParameters& parameters) {
+  assert(into < epoch);  // it was split from that one
   for (RigView& view : views_) {
-    if (view.epoch == epoch) view.epoch = before;
+    if (view.epoch == epoch) view.epoch = into;
     if (view.epoch > epoch) --view.epoch;
   }
+  // What was split off from it since is now split off from the other.
+  const std::string gone = epoch_names_[static_cast<std::size_t>(epoch)];
+  for (std::string& name : epoch_names_)
+    if (name.starts_with(gone + "-"))
+      name = epoch_names_[static_cast<std::size_t>(into)] + name.substr(gone.size());
   epoch_names_.erase(epoch_names_.begin() + epoch);
   epoch_sigma_rad_.erase(epoch_sigma_rad_.begin() + epoch);
   parameters.epochs.erase(parameters.epochs.begin() + epoch);

@@ -108,8 +108,8 @@ class RigModel {
   void SplitEpoch(int first_view, const std::string& name, double sigma_rad,
                   RigParameters& parameters);
   void SplitMounting(int first_view, const std::string& id, RigParameters& parameters);
-  // Takes back a split: the views of the epoch belong to that named `into` again.
-  void JoinEpoch(int epoch, const std::string& into, RigParameters& parameters);
+  // Takes back a split: the views of the epoch belong to `into` again, which it was split from.
+  void JoinEpoch(int epoch, int into, RigParameters& parameters);
   // The turntable turns against the sign of its log.
   void ReverseTurntable();
 

@@ -173,45 +173,6 @@ TEST(MakeMask, GrabCutWithoutAPlate) {
   EXPECT_EQ(cv::norm(mask->coverage, again->coverage, cv::NORM_INF), 0);
 }
 
-// A ball lit from the camera on black: its brightness falls to nothing at its outline.
-Scene LitBall() {
-  const cv::Size size(420, 320);
-  const auto ball = [](double x, double y) { return std::hypot(x - 210.3, y - 160.7) - 110; };
-  Scene scene;
-  const cv::Mat coverage = CoverageOf(size, ball);
-  scene.coverage = ToBytes(coverage);
-  scene.photo.create(size, CV_8UC3);
-  scene.plate.create(size, CV_8UC3);
-  Rng rng(8);
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) {
-      const double r = std::min(1.0, (ball(x + 0.5, y + 0.5) + 110) / 110);
-      const double a = coverage.at<float>(y, x), light = 0.15 + 0.85 * std::sqrt(1 - r * r);
-      for (int c = 0; c < 3; ++c) {
-        const double back = 0.004, front = light * (0.5 - 0.1 * c);
-        scene.photo.at<cv::Vec3b>(y, x)[c] =
-            cv::saturate_cast<uchar>(255 * Srgb(a * front + (1 - a) * back) + rng.Normal());
-        scene.plate.at<cv::Vec3b>(y, x)[c] =
-            cv::saturate_cast<uchar>(255 * Srgb(back) + rng.Normal());
-      }
-    }
-  }
-  return scene;
-}
-
-TEST(MakeMask, ARimThatDarkensIsNotCutOff) {
-  const Scene scene = LitBall();
-  // The colour 3 px inside the edge would put it 0.42 px (0.47 px without a plate) too far inside.
-  for (const bool with_plate : {true, false}) {
-    const auto mask = MakeMask(scene.photo, with_plate ? scene.plate : cv::Mat(), {});
-    ASSERT_TRUE(mask) << ToString(mask.error());
-    const EdgeError error = CompareContours(mask->coverage, scene.coverage);
-    EXPECT_NEAR(error.bias, 0, with_plate ? 0.15 : 0.25) << with_plate;
-    EXPECT_LT(error.rms, 0.25) << with_plate;
-    EXPECT_GT(error.found, 0.999);
-  }
-}
-
 TEST(MakeMask, BadPicturesAreRefused) {
   const Scene scene = Compose(
       CoverageOf({64, 48}, [](double x, double y) { return std::hypot(x - 30, y - 20) - 10; }), 1.0,

@@ -55,9 +55,9 @@ TEST(RigModel, ASplitThatIsTakenBackLeavesNothing) {
   const RigModel before = r.rig;
   const RigParameters parameters = r.parameters;
   r.rig.SplitEpoch(1, "1-from-b", 0.3, r.parameters);
-  r.rig.SplitEpoch(3, "1-from-d", 0.3, r.parameters);
+  r.rig.SplitEpoch(3, "1-from-b-from-d", 0.3, r.parameters);
   r.parameters.epochs.back() += 0.1;
-  r.rig.JoinEpoch(1, "1", r.parameters);
+  r.rig.JoinEpoch(1, 0, r.parameters);
   EXPECT_EQ(r.rig.epoch_names(), (std::vector<std::string>{"1", "1-from-d"}));
   ASSERT_EQ(r.parameters.epochs.size(), 2u);
   EXPECT_EQ(r.parameters.epochs.back(), parameters.epochs.front() + 0.1);
