@@ -366,7 +366,8 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
     return BadInput("the protocol of Fig 12 has no beads", "--beads", "leave out --preset fig12");
   if (options.is_fig12()) {
     // Exact masks: no bias is looked for.
-    if (options.fig12.noise.bias_px == 0) options.joint.rig.mask_bias_px = 0.02;
+    if (options.fig12.noise.bias_px == 0)
+      options.joint.rig.mask_bias_px = 0.02 * 1848 / options.photo_width();
     // The mesh is the truth: residuals hang together as far as the masks' errors do, and no more.
     constexpr double kLeastCorrelationPx = 2;
     if (options.fig12.noise.sigma_px > 0)

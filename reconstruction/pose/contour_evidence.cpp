@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 
@@ -150,6 +151,22 @@ double RobustSigma(std::span<const ContourMatch> matches) {
   return 1.4826 * *middle;
 }
 
+SurfacePlace PlaceOf(const ViewState& state, const ContourMatch& match, double place_mm) {
+  // The surface is tangent to the plane through the camera's centre and the outline.
+  const Intrinsics& in = state.intrinsics;
+  const Eigen::Vector3d x = state.camera_from_model * match.point;
+  const Eigen::Vector2d n(match.normal.x() * in.fl_x, match.normal.y() * in.fl_y);
+  const Eigen::Vector3d normal = state.camera_from_model.rotation().transpose() *
+                                 Eigen::Vector3d(n.x(), n.y(), -n.dot(x.head<2>()) / x.z());
+  Eigen::Index axis = 0;
+  normal.cwiseAbs().maxCoeff(&axis);
+  SurfacePlace place{};
+  for (int k = 0; k < 3; ++k)
+    place[static_cast<std::size_t>(k)] = static_cast<int>(std::floor(match.point[k] / place_mm));
+  place[3] = static_cast<int>(2 * axis + (normal[axis] < 0 ? 1 : 0));
+  return place;
+}
+
 double WeightOf(const ContourMatch& match, double residual_px, const EvidenceWeights& weights) {
   return std::min(1.0, match.share_px / weights.correlation_px) *
          TukeyWeight(residual_px, weights.tukey_sigmas * weights.sigma_px) /
@@ -161,6 +178,8 @@ CondensedEvidence Condense(const ViewState& state, std::span<const ContourMatch>
   CondensedEvidence evidence;
   evidence.state = state;
   evidence.pivot = pivot;
+  const double s = weights.discrepancy_px;
+  std::map<SurfacePlace, PlaceEvidence> places;
   for (const ContourMatch& match : matches) {
     EvidenceVector dr;
     const double r = ContourResidual(state, match.point, match.target, match.normal, pivot, &dr);
@@ -169,6 +188,17 @@ CondensedEvidence Condense(const ViewState& state, std::span<const ContourMatch>
     evidence.H.selfadjointView<Eigen::Lower>().rankUpdate(dr, weight);
     evidence.g += (weight * r) * dr;
     evidence.weight += weight * weights.sigma_px * weights.sigma_px;
+    if (!(s > 0)) continue;
+    PlaceEvidence& place = places[PlaceOf(state, match, weights.place_mm)];
+    place.D += weight * s * s;
+    place.C += (weight * s) * dr;
+    place.g += weight * s * r;
+  }
+  for (auto& [at, place] : places) {
+    place.place = at;
+    evidence.H.selfadjointView<Eigen::Lower>().rankUpdate(place.C, -1 / (1 + place.D));
+    evidence.g -= place.C * (place.g / (1 + place.D));
+    evidence.places.push_back(place);
   }
   evidence.H.triangularView<Eigen::StrictlyUpper>() = evidence.H.transpose();
   return evidence;

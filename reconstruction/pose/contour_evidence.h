@@ -90,18 +90,39 @@ struct EvidenceWeights {
   double sigma_px = 1;          // of one residual
   double correlation_px = 43;   // of contour that counts as one independent observation
   double tukey_sigmas = 4.685;  // beyond this a match counts nothing
+  // What the model lacks at a place of the surface and views that see it share, standard deviation;
+  // 0: nothing.
+  double discrepancy_px = 0;
+  double place_mm = 1;  // width of a place
 };
+
+// Cube of a grid in the model frame, and the side that the surface turns there (0 to 5: the
+// largest component of its normal and that one's sign).
+using SurfacePlace = std::array<int, 4>;
+// Precondition: place_mm > 0. Thread contract: pure.
+SurfacePlace PlaceOf(const ViewState& state, const ContourMatch& match, double place_mm);
 
 // Independent observations that a match of this residual stands for, over sigma^2.
 double WeightOf(const ContourMatch& match, double residual_px, const EvidenceWeights& weights);
 
+// What a view knows of the discrepancy d at one place, in units of its standard deviation:
+// 1/2 D d^2 + d (C' y + g).
+struct PlaceEvidence {
+  SurfacePlace place{};
+  double D = 0;
+  EvidenceVector C = EvidenceVector::Zero();
+  double g = 0;
+};
+
 // 1/2 y' H y + g' y + constant of y = (motion, log focal, principal point, bias) - (0, state).
+// H and g are those of the view alone: minimised over the discrepancies, 1/2 d^2 each besides.
 struct CondensedEvidence {
   ViewState state;
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();  // camera frame
   EvidenceMatrix H = EvidenceMatrix::Zero();
   EvidenceVector g = EvidenceVector::Zero();
-  double weight = 0;  // sum of weights times sigma^2: independent observations
+  double weight = 0;                  // sum of weights times sigma^2: independent observations
+  std::vector<PlaceEvidence> places;  // in order; for those who see one in several views
 };
 CondensedEvidence Condense(const ViewState& state, std::span<const ContourMatch> matches,
                            const Eigen::Vector3d& pivot, const EvidenceWeights& weights);

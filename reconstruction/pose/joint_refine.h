@@ -23,7 +23,8 @@ struct RefineOptions {
   // A view whose stated sigma moves its image by more starts from its silhouette's centroid.
   double centre_beyond_px = 16;
   // Contour that counts as one independent observation is estimated from the residuals of all
-  // views, and is at least this: real residuals are model discrepancy.
+  // views, and is at least this: real residuals are model discrepancy. What of it views share is
+  // estimated as well, and counts once for all that see a place.
   double correlation_floor_px = 43;
   double sigma_floor_px = 0.15;  // sub-pixel contours; binary masks add a pixel's quantisation
   int max_iterations = 40;
@@ -33,6 +34,13 @@ struct RefineOptions {
 // 1 px of a picture 1848 px wide, in those of the pictures that `options` are scaled to; not less
 // than a half.
 inline double UnitPx(const RefineOptions& options) { return options.last_window_px / 8; }
+
+// How the residuals of a solve hang together.
+struct ResidualCorrelation {
+  double along_px = 0;       // of contour that counts as one independent observation
+  double between_views = 0;  // share that views of the same place have in common
+  double place_mm = 1;       // width of such a place: that of `along_px` on the specimen
+};
 
 struct ViewFit {
   MatchResult match;
@@ -46,9 +54,9 @@ double PooledSigma(std::span<const ViewFit> fits);
 
 struct RefineResult {
   RigParameters parameters;
-  std::vector<ViewFit> fits;  // at `parameters`
-  double cost = 0;            // of the last rig solve
-  double correlation_px = 0;  // used for the weights, see RefineOptions
+  std::vector<ViewFit> fits;        // at `parameters`
+  double cost = 0;                  // of the last rig solve
+  ResidualCorrelation correlation;  // used for the weights
   int iterations = 0;
   bool converged = false;
   std::vector<SolveStep> steps;  // one for each iteration; earlier solves' first where Continued
@@ -67,12 +75,13 @@ RefineResult RefineJoint(const ContourMesh& mesh, const RigModel& rig,
 
 // Matches and condenses one photograph at `state`. Thread contract: pure.
 ViewFit FitView(const ContourMesh& mesh, const PhotoContour& photo, const ViewState& state,
-                double window_px, double correlation_px, const RefineOptions& options);
+                double window_px, const ResidualCorrelation& correlation,
+                const RefineOptions& options);
 
 // Matches and condenses every view in use at given parameters, without solving.
 std::vector<ViewFit> FitViews(const ContourMesh& mesh, const RigModel& rig,
                               std::span<const PhotoContour> photos, const std::vector<bool>& use,
                               const RigParameters& parameters, double window_px,
-                              double correlation_px, const RefineOptions& options);
+                              const ResidualCorrelation& correlation, const RefineOptions& options);
 
 }  // namespace scan

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace scan {
 namespace {
@@ -55,6 +56,48 @@ double CorrelationLength(std::span<const std::span<const ContourMatch>> views) {
     length_px += 2 * kBinPx * correlation;
   }
   return length_px;
+}
+
+double CorrelationBetweenViews(std::span<const ViewResiduals> views, double place_mm,
+                               double correlation_px) {
+  struct Mean {
+    double length_px = 0, value = 0;
+  };
+  struct Sums {  // over the views of one place; those over pairs follow
+    double weight = 0, value = 0, weight2 = 0, value2 = 0;
+  };
+  std::map<SurfacePlace, Sums> places;
+  for (const ViewResiduals& view : views) {
+    const double sigma = RobustSigma(view.matches);
+    if (!(sigma > 0)) continue;
+    std::map<SurfacePlace, Mean> means;
+    for (const ContourMatch& m : view.matches) {
+      Mean& mean = means[PlaceOf(view.state, m, place_mm)];
+      mean.length_px += m.share_px;
+      mean.value += m.share_px * std::clamp(m.residual_px / sigma, -3.0, 3.0);
+    }
+    for (const auto& [place, mean] : means) {
+      if (!(mean.length_px > 0)) continue;
+      const double weight = std::min(1.0, mean.length_px / correlation_px);
+      const double value = weight * mean.value / mean.length_px;
+      Sums& sums = places[place];
+      sums.weight += weight;
+      sums.value += value;
+      sums.weight2 += weight * weight;
+      sums.value2 += value * value;
+    }
+  }
+  double products = 0, pairs = 0, squares = 0, count = 0;
+  for (const auto& [place, sums] : places) {
+    products += sums.value * sums.value - sums.value2;
+    pairs += sums.weight * sums.weight - sums.weight2;
+    squares += sums.value2;
+    count += sums.weight2;
+  }
+  if (!(pairs > 0) || !(squares > 0)) return 0;
+  const double share = products / pairs / (squares / count);
+  const double standard_error = std::sqrt(2 / pairs);  // each pair is in it twice
+  return share > 2 * standard_error ? std::min(share, 1.0) : 0;
 }
 
 }  // namespace scan

@@ -41,8 +41,9 @@ Result<RigAttempt> Attempt(const AttemptInput& in, const RigModel& nominal, std:
   const RigAttempt plain = attempt;
   for (int round = 0; round < kRounds && AnyLogged(rig) && !stop.stop_requested(); ++round) {
     RigParameters parameters = attempt.fit.parameters;
-    const auto found = FindChanges(in.mesh, rig, in.photos, attempt.use, in.refine,
-                                   attempt.fit.correlation_px, in.names, in.changes, parameters);
+    const auto found =
+        FindChanges(in.mesh, rig, in.photos, attempt.use, in.refine,
+                    attempt.fit.correlation.along_px, in.names, in.changes, parameters);
     if (found.empty()) break;
     for (const RigChange& change : found)
       if (change.kind == RigChange::Kind::view_alone)

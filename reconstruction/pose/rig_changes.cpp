@@ -171,7 +171,8 @@ RigEvidence EvidenceOfViewsAlone(const ContourMesh& mesh, const RigModel& rig,
     ViewState own = by_rig;
     own.camera_from_model = RefineView(mesh, photos[i], by_rig, alone);
     const auto fit_at = [&](const ViewState& state) {
-      return FitView(mesh, photos[i], state, options.last_window_px, correlation_px, options);
+      return FitView(mesh, photos[i], state, options.last_window_px, {.along_px = correlation_px},
+                     options);
     };
     ViewFit fit = fit_at(own);
     const auto misfit = [&](const ViewState& state) {

@@ -5,6 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <map>
 #include <span>
 
 #include "reconstruction/pose/rig_chain.h"
@@ -12,7 +14,6 @@
 namespace scan {
 namespace {
 
-// Blocks: mounting 6, epoch 1, aim 6, axis 4, lens 3, view 8, mask bias 1, CT scale 1.
 struct ViewMotion {
   const RigView& view;
   TableFromModel start;
@@ -35,14 +36,39 @@ struct ViewMotion {
   }
 };
 
-// r = A (y - y0) + b with A' A = H and A' b = g.
-class EvidenceCost {
+using ViewMotionFunction =
+    ceres::AutoDiffCostFunction<ViewMotion, kEvidenceSize, 6, 1, 6, 4, 3, 8, 1, 1>;
+
+// Blocks: mounting 6, epoch 1, aim 6, axis 4, lens 3, view 8, mask bias 1, CT scale 1.
+constexpr std::array<int, 8> kBlockSizes{6, 1, 6, 4, 3, 8, 1, 1};
+
+// A view's evidence: r = A (y - y0) + b with A' A = H and A' b = g, and for each place whose
+// discrepancy d other views see too  sqrt(D) d + (C' (y - y0) + g) / sqrt(D), H and g then without
+// what CondensedEvidence has them take the place for. After the blocks of the view's motion one of
+// size 1 for each of those places.
+class EvidenceCost final : public ceres::CostFunction {
  public:
-  EvidenceCost(ViewMotion motion, const EvidenceVector& y0, const CondensedEvidence& evidence)
-      : motion_(std::move(motion)), y0_(y0) {
+  EvidenceCost(const ViewMotion& motion, const EvidenceVector& y0,
+               const CondensedEvidence& evidence, std::span<const PlaceEvidence> shared)
+      : motion_(new ViewMotion(motion)), y0_(y0) {
+    const auto places = static_cast<Eigen::Index>(shared.size());
+    A_ = Eigen::MatrixXd::Zero(kEvidenceSize + places, kEvidenceSize);
+    b_ = Eigen::VectorXd::Zero(kEvidenceSize + places);
+    sqrt_D_ = Eigen::VectorXd::Zero(places);
+    EvidenceMatrix H = evidence.H;
+    EvidenceVector g = evidence.g;
+    for (Eigen::Index k = 0; k < places; ++k) {
+      const PlaceEvidence& place = shared[static_cast<std::size_t>(k)];
+      const double taken = 1 / (1 + place.D) - 1 / place.D;
+      H += taken * place.C * place.C.transpose();
+      g += taken * place.g * place.C;
+      sqrt_D_[k] = std::sqrt(place.D);
+      A_.row(kEvidenceSize + k) = place.C.transpose() / sqrt_D_[k];
+      b_[kEvidenceSize + k] = place.g / sqrt_D_[k];
+    }
     // Scaled to a unit diagonal first: rad, mm and px differ by orders of magnitude.
-    const EvidenceVector scale = evidence.H.diagonal().cwiseSqrt().cwiseMax(1e-12).cwiseInverse();
-    const Eigen::SelfAdjointEigenSolver<EvidenceMatrix> eigen(scale.asDiagonal() * evidence.H *
+    const EvidenceVector scale = H.diagonal().cwiseMax(1e-24).cwiseSqrt().cwiseInverse();
+    const Eigen::SelfAdjointEigenSolver<EvidenceMatrix> eigen(scale.asDiagonal() * H *
                                                               scale.asDiagonal());
     const double floor = 1e-13 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
     for (int i = 0; i < kEvidenceSize; ++i) {
@@ -50,26 +76,61 @@ class EvidenceCost {
       if (lambda <= floor) continue;
       const EvidenceVector v = eigen.eigenvectors().col(i);
       A_.row(i) = std::sqrt(lambda) * v.transpose() * scale.cwiseInverse().asDiagonal();
-      b_[i] = v.dot(scale.cwiseProduct(evidence.g)) / std::sqrt(lambda);
+      b_[i] = v.dot(scale.cwiseProduct(g)) / std::sqrt(lambda);
     }
+    set_num_residuals(static_cast<int>(b_.size()));
+    auto& sizes = *mutable_parameter_block_sizes();
+    sizes.assign(kBlockSizes.begin(), kBlockSizes.end());
+    sizes.insert(sizes.end(), shared.size(), 1);
   }
 
-  template <class T>
-  bool operator()(const T* mounting, const T* epoch, const T* aim, const T* axis, const T* lens,
-                  const T* own, const T* bias, const T* scale, T* residual) const {
-    Eigen::Matrix<T, kEvidenceSize, 1> y;
-    if (!motion_(mounting, epoch, aim, axis, lens, own, bias, scale, y.data())) return false;
-    Eigen::Map<Eigen::Matrix<T, kEvidenceSize, 1>> r(residual);
-    r = A_.cast<T>() * (y - y0_.cast<T>()) + b_.cast<T>();
+  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    constexpr int kMotionSize = 30;  // sum of kBlockSizes
+    std::array<double, kEvidenceSize * kMotionSize> storage{};
+    std::array<double*, kBlockSizes.size()> dy{};
+    for (std::size_t k = 0, offset = 0; k < dy.size(); offset += kBlockSizes[k++])
+      dy[k] = storage.data() + kEvidenceSize * offset;
+    EvidenceVector y;
+    if (!motion_.Evaluate(x, y.data(), jacobians ? dy.data() : nullptr)) return false;
+    Eigen::Map<Eigen::VectorXd> r(residuals, b_.size());
+    r = A_ * (y - y0_) + b_;
+    for (Eigen::Index k = 0; k < sqrt_D_.size(); ++k)
+      r[kEvidenceSize + k] += sqrt_D_[k] * *x[kBlockSizes.size() + static_cast<std::size_t>(k)];
+    if (!jacobians) return true;
+    for (std::size_t k = 0; k < kBlockSizes.size(); ++k) {
+      if (!jacobians[k]) continue;
+      Eigen::Map<RowMajor>(jacobians[k], b_.size(), kBlockSizes[k]) =
+          A_ * Eigen::Map<RowMajor>(dy[k], kEvidenceSize, kBlockSizes[k]);
+    }
+    for (Eigen::Index k = 0; k < sqrt_D_.size(); ++k) {
+      double* column = jacobians[kBlockSizes.size() + static_cast<std::size_t>(k)];
+      if (!column) continue;
+      std::fill_n(column, b_.size(), 0.0);
+      column[kEvidenceSize + k] = sqrt_D_[k];
+    }
     return true;
   }
 
  private:
-  ViewMotion motion_;
+  ViewMotionFunction motion_;
   EvidenceVector y0_;
-  EvidenceMatrix A_ = EvidenceMatrix::Zero();
-  EvidenceVector b_ = EvidenceVector::Zero();
+  Eigen::MatrixXd A_;
+  Eigen::VectorXd b_, sqrt_D_;
 };
+
+// Places that several views see, in order, with the number of each.
+std::map<SurfacePlace, int> SharedPlaces(
+    std::span<const std::optional<CondensedEvidence>> evidence) {
+  std::map<SurfacePlace, int> views;
+  for (const auto& view : evidence)
+    if (view)
+      for (const PlaceEvidence& place : view->places) ++views[place.place];
+  std::erase_if(views, [](const auto& place) { return place.second < 2; });
+  int number = 0;
+  for (auto& [place, index] : views) index = number++;
+  return views;
+}
 
 // (x - 0) / sigma for each component.
 class PriorCost final : public ceres::CostFunction {
@@ -93,8 +154,7 @@ class PriorCost final : public ceres::CostFunction {
   Eigen::VectorXd sigma_;
 };
 
-// Every element of `p` that takes part in a view's chain, with its place in the layout.
-constexpr std::array<int, 8> kBlockSizes{6, 1, 6, 4, 3, 8, 1, 1};
+// Of the blocks that take part in a view's chain, where they are in the layout.
 std::array<int, 8> BlockOffsets(const RigModel& rig, const RigLayout& layout, int view) {
   const RigView& v = rig.views()[view];
   return {
@@ -137,11 +197,6 @@ EvidenceVector EvidenceOrigin(const RigModel& rig, const CondensedEvidence& evid
   y0[9] = evidence.state.mask_bias_px;
   return y0;
 }
-
-using ViewCostFunction =
-    ceres::AutoDiffCostFunction<EvidenceCost, kEvidenceSize, 6, 1, 6, 4, 3, 8, 1, 1>;
-using ViewMotionFunction =
-    ceres::AutoDiffCostFunction<ViewMotion, kEvidenceSize, 6, 1, 6, 4, 3, 8, 1, 1>;
 
 }  // namespace
 
@@ -197,24 +252,38 @@ double SolveRig(const RigModel& rig, std::span<const std::optional<CondensedEvid
       if (rig.held(lens, k)) sigma[layout.lens(lens) + k] = k == 0 ? 1e-9 : 1e-6;
   ceres::Problem problem;
   auto* ordering = new ceres::ParameterBlockOrdering;
-  Eigen::VectorXd x = Pack(layout, parameters);
+  const std::map<SurfacePlace, int> places = SharedPlaces(evidence);
+  const auto place_count = static_cast<Eigen::Index>(places.size());
+  Eigen::VectorXd x(layout.size + place_count);
+  x << Pack(layout, parameters), Eigen::VectorXd::Zero(place_count);
   ForEachBlock(layout, parameters, [&](int offset, auto block) {
     double* at = x.data() + offset;
     const auto size = static_cast<Eigen::Index>(block.size());
     problem.AddResidualBlock(new PriorCost(sigma.segment(offset, size)), nullptr, at);
     ordering->AddElementToGroup(at, offset >= layout.view(0) ? 0 : 1);
   });
+  for (Eigen::Index k = 0; k < place_count; ++k) {
+    double* at = x.data() + layout.size + k;
+    problem.AddResidualBlock(new PriorCost(Eigen::VectorXd::Ones(1)), nullptr, at);
+    ordering->AddElementToGroup(at, 1);
+  }
   for (int i = 0; i < static_cast<int>(parameters.views.size()); ++i) {
     if (!evidence[i]) continue;
     const RigView& view = rig.views()[i];
     const ViewMotion motion{view, rig.start(view.mounting), evidence[i]->state.camera_from_model,
                             evidence[i]->pivot};
-    auto* cost = new ViewCostFunction(
-        new EvidenceCost(motion, EvidenceOrigin(rig, *evidence[i], view.lens), *evidence[i]));
-    std::array<double*, 8> blocks{};
-    const auto offsets = BlockOffsets(rig, layout, i);
-    for (int k = 0; k < 8; ++k) blocks[k] = x.data() + offsets[k];
-    problem.AddResidualBlock(cost, nullptr, blocks.data(), 8);
+    std::vector<double*> blocks;
+    for (const int offset : BlockOffsets(rig, layout, i)) blocks.push_back(x.data() + offset);
+    std::vector<PlaceEvidence> shared;
+    for (const PlaceEvidence& place : evidence[i]->places) {
+      const auto found = places.find(place.place);
+      if (found == places.end()) continue;
+      shared.push_back(place);
+      blocks.push_back(x.data() + layout.size + found->second);
+    }
+    problem.AddResidualBlock(new EvidenceCost(motion, EvidenceOrigin(rig, *evidence[i], view.lens),
+                                              *evidence[i], shared),
+                             nullptr, blocks);
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
@@ -265,11 +334,29 @@ Eigen::MatrixXd RigInformation(const RigModel& rig, const RigLayout& layout,
                                std::span<const std::optional<CondensedEvidence>> evidence,
                                const RigParameters& parameters) {
   Eigen::MatrixXd information = PriorSigmas(rig, layout).cwiseAbs2().cwiseInverse().asDiagonal();
+  struct Seen {
+    Eigen::VectorXd C;
+    double D = 0;
+  };
+  const std::map<SurfacePlace, int> places = SharedPlaces(evidence);
+  std::vector<Seen> seen(places.size(), {Eigen::VectorXd::Zero(layout.size), 0});
   for (int i = 0; i < static_cast<int>(rig.views().size()); ++i) {
     if (!evidence[i]) continue;
     const Eigen::MatrixXd J = ViewJacobian(rig, layout, parameters, i, evidence[i]->pivot);
-    information += J.transpose() * evidence[i]->H * J;
+    EvidenceMatrix H = evidence[i]->H;
+    for (const PlaceEvidence& place : evidence[i]->places) {
+      const auto found = places.find(place.place);
+      if (found == places.end()) continue;
+      H += place.C * place.C.transpose() / (1 + place.D);
+      Seen& sum = seen[static_cast<std::size_t>(found->second)];
+      sum.C += J.transpose() * place.C;
+      sum.D += place.D;
+    }
+    information += J.transpose() * H * J;
   }
+  // The discrepancies minimised over.
+  for (const Seen& place : seen)
+    information.noalias() -= place.C * place.C.transpose() / (1 + place.D);
   return information;
 }
 

@@ -32,6 +32,11 @@ RefineOptions ScaledTo(RefineOptions options, double scale) {
   return options;
 }
 
+RigPriors ScaledTo(RigPriors priors, double scale) {
+  priors.mask_bias_px *= scale;
+  return priors;
+}
+
 std::vector<PhotoContour> PhotoContours(std::span<const Mask> masks) {
   std::vector<PhotoContour> photos(masks.size());
   tbb::parallel_for(std::size_t{0}, masks.size(),
@@ -233,7 +238,7 @@ std::vector<FreeDirection> ByView(const PhotoSet& photos, std::vector<FreeDirect
 
 ObservabilityOptions ObservabilityFor(const RefineResult& fit) {
   ObservabilityOptions options;
-  options.weights.correlation_px = fit.correlation_px;
+  options.weights.correlation_px = fit.correlation.along_px;
   return options;
 }
 
@@ -257,8 +262,8 @@ std::vector<FreeDirection> FreeDirections(const ContourMesh& mesh, const RigMode
 }
 
 // Residuals of a good fit leave nothing to ask: the scale is looked at only above a pixel of a
-// picture 1848 px wide, or where no logged pose explains its outline (then from as far away as the
-// solve began).
+// picture 1848 px wide, or where few logged poses explain their outlines (then all of them count,
+// from as far away as the solve began: some pose of another size may fit one outline).
 void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vector<bool>& use,
                         const RigParameters& parameters, std::span<const ViewFit> fits,
                         std::vector<Judgement>& judgements, std::stop_token stop) {
@@ -267,13 +272,14 @@ void RejectRefutedScale(const Evidence& in, const RigModel& rig, const std::vect
     logged[i] = use[i] && rig.views()[i].logged;
     stand[i] = logged[i] && judgements[i].reason.empty();
   }
-  const auto any = [](const std::vector<bool>& views) {
-    return std::find(views.begin(), views.end(), true) != views.end();
+  const auto count = [](const std::vector<bool>& views) {
+    return std::count(views.begin(), views.end(), true);
   };
-  if (!any(logged) || (any(stand) && PooledSigma(fits) < in.scale)) return;
+  const bool most_stand = 2 * count(stand) >= count(logged);
+  if (count(logged) == 0 || (most_stand && PooledSigma(fits) < in.scale)) return;
   RefineOptions refine = in.refine;
-  if (any(stand)) refine.first_window_px = 4 * refine.last_window_px;
-  const std::vector<bool>& views = any(stand) ? stand : logged;
+  if (most_stand) refine.first_window_px = 4 * refine.last_window_px;
+  const std::vector<bool>& views = most_stand ? stand : logged;
   const std::string reason =
       RefutedScale(in.mesh, rig, in.photos, views, parameters, refine, std::move(stop));
   if (reason.empty()) return;
@@ -338,7 +344,7 @@ void AllowForBends(const Evidence& in, RigAttempt& attempt, BentSpecimen& specim
   again.first_window_px = 2 * in.refine.last_window_px;
   const auto fits_of = [&](const ContourMesh& mesh) {
     return FitViews(mesh, attempt.rig, in.photos, attempt.use, fit.parameters,
-                    again.first_window_px, fit.correlation_px, in.refine);
+                    again.first_window_px, fit.correlation, in.refine);
   };
   specimen.parts = FindBentParts(in.mesh, fits_of(in.mesh), options);
   if (specimen.parts.empty()) return;
@@ -368,14 +374,17 @@ std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
   std::vector<bool> agree = attempt.use;
   for (std::size_t i = 0; i < agree.size(); ++i)
     agree[i] = agree[i] && judgements[i].reason.empty();
-  const bool some = std::find(agree.begin(), agree.end(), true) != agree.end();
   // A view without a logged pose rests on its own outline alone: with samples twice as dense the
   // orchid's come nearer to the Cramer-Rao bound by 6 % (924 x 612).
   const bool alone = std::none_of(rig.views().begin(), rig.views().end(),
                                   [](const RigView& view) { return view.logged; });
   if (alone) again.spacing_px = 0.5 * in.refine.spacing_px;
-  if (alone || (some && agree != attempt.use)) {
-    fit = Continued(fit, RefineJoint(in.mesh, rig, in.photos, some ? agree : attempt.use,
+  // One or two of many on one rig could be fitted at any scale, as the specimen's placing is free.
+  const auto left = std::count(agree.begin(), agree.end(), true);
+  const auto all = std::count(attempt.use.begin(), attempt.use.end(), true);
+  const bool enough = left >= 3 || 2 * left >= all || (alone && left > 0);
+  if (alone || (enough && agree != attempt.use)) {
+    fit = Continued(fit, RefineJoint(in.mesh, rig, in.photos, enough ? agree : attempt.use,
                                      fit.parameters, again, stop));
     judgements = Judge(in, rig, fit);
   }
@@ -402,7 +411,8 @@ Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask>
                        PlacingSpectra(in.mesh, rig, posterior, fit.parameters)};
   poses.free_directions = ByView(photos, free);
   poses.nuisances["residual_sigma_px"].value = PooledSigma(fit.fits);
-  poses.nuisances["residual_correlation_px"].value = fit.correlation_px;
+  poses.nuisances["residual_correlation_px"].value = fit.correlation.along_px;
+  poses.nuisances["residual_share_between_views"].value = fit.correlation.between_views;
   if (attempt.reversed) poses.notes.push_back(kReversedNote);
   poses.notes.insert(poses.notes.end(), notes.begin(), notes.end());
   for (const FreeDirection& direction : poses.free_directions)
@@ -414,7 +424,8 @@ Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask>
 Result<Poses> Solve(const TriangleMesh& mesh, const PhotoSet& photos, std::span<const Mask> masks,
                     const JointOptions& options, const ProgressFn& progress,
                     const std::stop_token& stop) {
-  RigModel rig(photos, options.rig);
+  const double scale = photos.intrinsics(photos.photos.front()).w / 1848.0;
+  RigModel rig(photos, ScaledTo(options.rig, scale));
   if (!options.bead_findings.beads.empty() &&
       options.bead_findings.images.size() != photos.photos.size())
     return BadInput("the number of lists of bead images is not that of the photographs", "beads",
@@ -432,7 +443,6 @@ Result<Poses> Solve(const TriangleMesh& mesh, const PhotoSet& photos, std::span<
     known[m] = placing != options.table_from_model.end();
     if (known[m]) rig.set_start(static_cast<int>(m), placing->second);
   }
-  const double scale = photos.intrinsics(photos.photos.front()).w / 1848.0;
   const Evidence in{contour_mesh, contours, options, ScaledTo(options.refine, scale), scale};
   Report(progress, "poses: search", 0.0);
   const Alternatives alternatives = StartViewsAlone(in, photos, rig, use, known, stop);

@@ -26,9 +26,9 @@
 namespace scan {
 
 struct JointOptions {
-  std::string model;  // the mesh file's name, for the result
-  RigPriors rig;
-  RefineOptions refine;  // px of a picture 1848 px wide; scaled to the photos
+  std::string model;     // the mesh file's name, for the result
+  RigPriors rig;         // px of a picture 1848 px wide; scaled to the photos
+  RefineOptions refine;  // the same
   AcceptanceOptions acceptance;
   StartOptions start;
   ChangeOptions changes;

@@ -24,7 +24,7 @@ Result<Efficiency> EfficiencyBench::Measure(const ContourNoise& noise, double bi
   fig12.noise = noise;
   const PoseTrial trial = MakeFig12Trial(mesh_, fig12);
   JointOptions joint;
-  joint.rig.mask_bias_px = bias_sigma_px;
+  joint.rig.mask_bias_px = bias_sigma_px * 1848 / fig12.w;
   // The mesh is exact: residuals are the noise alone.
   joint.refine.correlation_floor_px = 2.0 * 1848 / fig12.w;
   // What is measured is the end of the search, not its reach.

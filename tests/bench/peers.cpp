@@ -20,7 +20,7 @@
 #include "reconstruction/specimens/photograph.h"
 #include "reconstruction/specimens/specimen.h"
 #include "reconstruction/surface/decimate.h"
-#include "squirrel.h"
+#include "tests/accuracy/real_sets/squirrel_set.h"
 
 namespace scan::bench {
 namespace {
@@ -84,7 +84,7 @@ std::optional<PeerScene> SquirrelScene(const PeersOptions& options) {
   for (std::size_t i = 0; i < squirrel->masks.size(); ++i) {
     const std::string& name = squirrel->photos.photos[i].name;
     scene.pictures.push_back(cv::imread(options.squirrel + "/photos/" + name + ".jpg"));
-    scene.trial.truth.push_back({squirrel->truth.at(name), squirrel->true_intrinsics});
+    scene.trial.truth.push_back({squirrel->truth.views.at(name), squirrel->truth.intrinsics});
     Mask& mask = scene.trial.masks[i];  // the dark base makes the lowest 12 % unreliable
     cv::Mat points;
     cv::findNonZero(mask.coverage, points);

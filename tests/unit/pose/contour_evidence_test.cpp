@@ -74,6 +74,51 @@ TEST(MatchContour, TheFarSideOfAThinLegIsNoPartner) {
   EXPECT_NEAR(match.matches[0].residual_px, 3, 0.51);
 }
 
+// H and g of residuals r = J y + r0 whose covariance is the inverse weights and, at each place, one
+// discrepancy for all: by the whole covariance.
+TEST(Condense, TakesTheDiscrepancyOfAPlaceOnce) {
+  const ViewState state = SomeState();
+  const Eigen::Vector3d pivot = state.camera_from_model * Eigen::Vector3d::Zero();
+  std::vector<ContourMatch> matches;
+  for (int i = 0; i < 40; ++i) {
+    ContourMatch m;
+    m.point = {std::sin(i), std::cos(2 * i), 0.1 * i};
+    m.normal = Eigen::Vector2d(std::cos(0.3 * i), std::sin(0.3 * i));
+    m.target = state.intrinsics.fl_x / 520 * (state.camera_from_model * m.point).head<2>() +
+               Eigen::Vector2d(930, 600) + 0.4 * m.normal;
+    m.share_px = 4;
+    matches.push_back(m);
+  }
+  EvidenceWeights weights;
+  weights.sigma_px = 0.7;
+  weights.tukey_sigmas = 1e6;  // least squares
+  weights.discrepancy_px = 0.5;
+  weights.place_mm = 4;
+  const CondensedEvidence evidence = Condense(state, matches, pivot, weights);
+
+  const auto n = static_cast<Eigen::Index>(matches.size());
+  Eigen::MatrixXd J(n, kEvidenceSize), covariance = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd r(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const ContourMatch& a = matches[static_cast<std::size_t>(i)];
+    EvidenceVector dr;
+    r[i] = ContourResidual(state, a.point, a.target, a.normal, pivot, &dr);
+    J.row(i) = dr;
+    covariance(i, i) = 1 / WeightOf(a, r[i], weights);
+    for (Eigen::Index k = 0; k < n; ++k)
+      if (PlaceOf(state, a, weights.place_mm) ==
+          PlaceOf(state, matches[static_cast<std::size_t>(k)], weights.place_mm))
+        covariance(i, k) += 0.25;
+  }
+  const EvidenceMatrix H = J.transpose() * covariance.llt().solve(J);
+  const EvidenceVector g = J.transpose() * covariance.llt().solve(r);
+  EXPECT_GT(evidence.places.size(), 4u);
+  EXPECT_LT(evidence.places.size(), 30u);
+  const EvidenceVector unit = H.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((unit.asDiagonal() * (evidence.H - H) * unit.asDiagonal()).norm(), 1e-9);
+  EXPECT_LT((unit.asDiagonal() * (evidence.g - g)).norm(), 1e-9);
+}
+
 double ShareLookedAt(const TriangleMesh& mesh) {
   const ContourMesh contour_mesh(mesh);
   const ViewState state = test::BugView();

@@ -1,7 +1,8 @@
-#include "squirrel.h"
+#include "tests/accuracy/real_sets/squirrel_set.h"
 
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "drivers/base/files.h"
 #include "drivers/base/units.h"
@@ -23,20 +24,18 @@ Eigen::Isometry3d IsometryOf(const json& rows) {
 
 std::optional<Squirrel> LoadSquirrel(const std::filesystem::path& folder) {
   const auto text = ReadTextFile(folder / "transforms.json");
-  const auto truth_text = ReadTextFile(folder / "truth.json");
+  auto truth = ReadCalibrated(folder / "truth.json");
   auto mesh = ReadMesh(folder / "mesh_mm.ply");
-  if (!text || !truth_text || !mesh) return std::nullopt;
-  const json file = json::parse(*text), truth = json::parse(*truth_text);
+  if (!text || !truth || !mesh) return std::nullopt;
+  const json file = json::parse(*text);
   Squirrel squirrel;
+  squirrel.truth = std::move(*truth);
   squirrel.mesh = std::move(*mesh);
   LensState lens;
   lens.id = "lens";
   lens.intrinsics = {file["w"], file["h"], file["fl_x"], file["fl_y"], file["cx"], file["cy"]};
   lens.sigma = {file["intrinsics_sigma"]["fl_rel"], file["intrinsics_sigma"]["c_px"]};
   squirrel.photos.lens_states.push_back(lens);
-  squirrel.true_intrinsics = lens.intrinsics;
-  squirrel.true_intrinsics.cx = truth["cx"];
-  squirrel.true_intrinsics.cy = truth["cy"];
   Aim aim;
   aim.id = "a0";
   aim.camera = "c0";
@@ -60,9 +59,19 @@ std::optional<Squirrel> LoadSquirrel(const std::filesystem::path& folder) {
         cv::imread((folder / frame["mask_path"].get<std::string>()).string(), cv::IMREAD_GRAYSCALE);
     mask.binary = true;
     squirrel.masks.push_back(mask);
-    squirrel.truth[photo.name] = CameraFromModel(IsometryOf(truth["views"][photo.name]));
   }
   return squirrel;
+}
+
+void IgnoreBase(std::vector<Mask>& masks) {
+  for (Mask& mask : masks) {
+    cv::Mat points;
+    cv::findNonZero(mask.coverage, points);
+    const cv::Rect box = cv::boundingRect(points);
+    mask.ignore = cv::Mat(mask.coverage.size(), CV_8U, cv::Scalar(0));
+    const int top = box.y + static_cast<int>(0.88 * box.height);
+    mask.ignore.rowRange(top, mask.ignore.rows).setTo(255);
+  }
 }
 
 }  // namespace scan::test
