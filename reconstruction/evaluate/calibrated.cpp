@@ -94,6 +94,9 @@ std::vector<MovedParameter> MovedLens(const Poses& poses, const PhotoSet& photos
       } else if (name == "cy") {
         p.moved -= nominal.cy;
         p.truth = truth.cy - nominal.cy;
+      } else if (name == "k1") {
+        p.moved -= nominal.k1;
+        p.truth = truth.k1 - nominal.k1;
       } else {
         p.truth = std::log(truth.fl_x / nominal.fl_x);
       }

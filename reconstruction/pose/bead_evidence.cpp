@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/rigid_motion.h"
 
 namespace scan {
@@ -37,6 +38,8 @@ Eigen::Vector2d BeadResidual(const ViewState& state, const BeadSighting& sightin
     dr->col(6) = -(pixel - Eigen::Vector2d(in.cx, in.cy));
     dr->middleCols<2>(7) = -Eigen::Matrix2d::Identity();
     dr->col(9).setZero();
+    const Eigen::Vector2d normalised = x.head<2>() * inverse_z;
+    dr->col(10) = K1OfCorner(in) * normalised.squaredNorm() * minus_focal.cwiseProduct(normalised);
   }
   return sighting.target - pixel;
 }

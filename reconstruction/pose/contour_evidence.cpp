@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/rigid_motion.h"
 
 namespace scan {
@@ -109,6 +110,9 @@ double ContourResidual(const ViewState& state, const Eigen::Vector3d& point,
     (*dr)[6] = -normal.dot(pixel - centre);
     dr->segment<2>(7) = -normal;
     (*dr)[9] = -1;
+    const Eigen::Vector2d normalised = x.head<2>() * inverse_z;
+    (*dr)[10] =
+        -K1OfCorner(in) * normalised.squaredNorm() * normal.dot(focal.cwiseProduct(normalised));
   }
   return normal.dot(target - pixel) - state.mask_bias_px;
 }

@@ -38,8 +38,9 @@ PhotoContour MakePhotoContour(const Mask& mask);
 
 // What a contour residual depends on, in this order: a motion of the body about a pivot in the
 // camera frame (w rad, tau mm), the log of the focal length, the principal point (px), the mask
-// bias (px, outward positive).
-constexpr int kEvidenceSize = 10;
+// bias (px, outward positive), the radial distortion at the picture's corner (relative, see
+// K1OfCorner).
+constexpr int kEvidenceSize = 11;
 using EvidenceVector = Eigen::Matrix<double, kEvidenceSize, 1>;
 using EvidenceMatrix = Eigen::Matrix<double, kEvidenceSize, kEvidenceSize>;
 
@@ -114,7 +115,8 @@ struct PlaceEvidence {
   double g = 0;
 };
 
-// 1/2 y' H y + g' y + constant of y = (motion, log focal, principal point, bias) - (0, state).
+// 1/2 y' H y + g' y + constant of y = (motion, log focal, principal point, bias, distortion) -
+// (0, state).
 // H and g are those of the view alone: minimised over the discrepancies, 1/2 d^2 each besides.
 struct CondensedEvidence {
   ViewState state;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/render/rasterise.h"
 
 namespace scan {
@@ -92,6 +93,11 @@ void DescribeShared(const PhotoSet& photos, const RigModel& rig, const RigPoster
     SharedEstimate cy = EstimateAt(posterior, layout.lens(lens) + 2, 0);
     cy.value = nominal.cy + parameters.lenses[i][2];
     estimate.parameters["cy"] = cy;
+    SharedEstimate k1 = EstimateAt(posterior, layout.lens(lens) + 3, 0);
+    k1.value = estimate.intrinsics.k1;
+    k1.sigma *= K1OfCorner(nominal);
+    k1.prior_sigma *= K1OfCorner(nominal);
+    estimate.parameters["k1"] = k1;
   }
   poses.nuisances["mask_bias_px"] =
       EstimateAt(posterior, layout.mask_bias(), parameters.mask_bias_px);

@@ -46,6 +46,7 @@ std::vector<std::string> ParameterNames(const PhotoSet& photos, const RigModel& 
     set(at, of + " focal length");
     set(at + 1, of + " cx");
     set(at + 2, of + " cy");
+    set(at + 3, of + " distortion");
   }
   set(layout.mask_bias(), "mask bias");
   set(layout.ct_scale(), "CT scale");

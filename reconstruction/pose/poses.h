@@ -55,8 +55,9 @@ struct ViewPose {
   // Marginal posterior of (w rad, rho mm), x_true = Exp(w) x_est + rho, x_est = camera_from_model
   // x, pivot the camera centre. Always finite.
   Matrix6d covariance = Matrix6d::Zero();
-  // The same with log focal length, principal point (px) and mask bias (px) behind it; empty where
-  // the method does not know it. Not written to poses.json.
+  // The same with log focal length, principal point (px), mask bias (px) and distortion behind it,
+  // in the order of kEvidenceSize; empty where the method does not know it. Not written to
+  // poses.json.
   Eigen::MatrixXd covariance_with_lens;
   SurfaceSigma surface_sigma_px;
   std::vector<AlternativePose> alternatives;
@@ -69,7 +70,7 @@ struct SharedEstimate {
 
 struct LensEstimate {
   Intrinsics intrinsics;
-  std::map<std::string, SharedEstimate> parameters;  // fl_rel, cx, cy ... with sigma and prior
+  std::map<std::string, SharedEstimate> parameters;  // fl_rel, cx, cy, k1 with sigma and prior
 };
 
 struct MountingEstimate {

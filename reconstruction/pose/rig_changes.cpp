@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "reconstruction/pose/acceptance.h"
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/rigid_motion.h"
 #include "reconstruction/pose/view_start.h"
 
@@ -38,6 +39,7 @@ EvidenceVector MotionFromEvidence(const RigModel& rig, const RigParameters& para
   y[7] = now.cx - state.intrinsics.cx;
   y[8] = now.cy - state.intrinsics.cy;
   y[9] = parameters.mask_bias_px - state.mask_bias_px;
+  y[10] = (now.k1 - state.intrinsics.k1) / K1OfCorner(state.intrinsics);
   return y;
 }
 
@@ -48,7 +50,7 @@ class ChangeTest {
     const RigLayout layout(rig);
     Eigen::VectorXd sigma = PriorSigmas(rig, layout);
     for (int lens = 0; lens < static_cast<int>(rig.lens_sigma().size()); ++lens)
-      for (int k = 0; k < 3; ++k)
+      for (int k = 0; k < kLensSize; ++k)
         if (rig.held(lens, k)) sigma[layout.lens(lens) + k] = 0;
     const int shared = layout.view(0);
     Eigen::MatrixXd information = Eigen::MatrixXd::Identity(shared, shared);

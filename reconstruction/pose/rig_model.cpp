@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string>
 
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/pose/rig_chain.h"
 
@@ -28,7 +29,7 @@ double AtLeast(double sigma, double floor) { return std::hypot(sigma, floor); }
 RigModel::RigModel(const PhotoSet& photos, const RigPriors& priors) : priors_(priors) {
   for (const LensState& lens : photos.lens_states) {
     intrinsics_.push_back(lens.intrinsics);
-    held_.push_back({true, true, true});
+    held_.emplace_back().fill(true);
     lens_sigma_.push_back(lens.sigma);
     if (lens_sigma_.back().c_px <= 0) lens_sigma_.back().c_px = 0.003 * lens.intrinsics.w;
   }
@@ -167,6 +168,7 @@ Intrinsics RigModel::IntrinsicsOf(const RigParameters& p, int lens) const {
   in.fl_y *= std::exp(d[0]);
   in.cx += d[1];
   in.cy += d[2];
+  in.k1 += d[3] * K1OfCorner(intrinsics_[lens]);
   return in;
 }
 

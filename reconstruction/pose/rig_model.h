@@ -41,13 +41,16 @@ struct RigPriors {
   RigidSigma view_floor{0.01 * kPi / 180, 0.02};
 };
 
+constexpr int kLensSize = 4;
+
 // Deviations from the nominal rig; all zero is the nominal rig at the start placing.
 struct RigParameters {
   std::vector<std::array<double, 6>> mountings;  // w rad, rho mm in the table frame
   std::vector<double> epochs;                    // turntable offset, rad
   std::vector<std::array<double, 6>> aims;       // w rad, rho mm in the camera frame
   std::array<double, 4> axis{};                  // tilt about x, y rad; shift along x, y mm
-  std::vector<std::array<double, 3>> lenses;     // log focal length, principal point px
+  // Log focal length, principal point px, radial distortion at the corner (relative).
+  std::vector<std::array<double, kLensSize>> lenses;
   // Per view: turntable rad, lift mm; then the camera's own w rad, rho mm.
   std::vector<std::array<double, 8>> views;
   double mask_bias_px = 0;
@@ -97,8 +100,8 @@ class RigModel {
   }
   const TableFromModel& start(int mounting) const { return start_[mounting]; }
 
-  // Lens parameters (log focal length, principal point x, y) that the solve holds at the nominal
-  // value; all of them at first.
+  // Lens parameters (as in RigParameters) that the solve holds at the nominal value; all of them at
+  // first.
   bool held(int lens, int parameter) const { return held_[lens][parameter]; }
   void set_held(int lens, int parameter, bool held) { held_[lens][parameter] = held; }
 
@@ -131,7 +134,7 @@ class RigModel {
   std::vector<RigidSigma> aim_sigma_;
   std::vector<IntrinsicsSigma> lens_sigma_;
   std::vector<Intrinsics> intrinsics_;
-  std::vector<std::array<bool, 3>> held_;
+  std::vector<std::array<bool, kLensSize>> held_;
   std::vector<TableFromModel> start_;
 };
 

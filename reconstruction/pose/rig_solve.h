@@ -18,7 +18,7 @@ struct RigLayout {
   int epoch(int i) const { return epochs_ + i; }
   int aim(int i) const { return aims_ + 6 * i; }
   int axis() const { return axis_; }
-  int lens(int i) const { return lenses_ + 3 * i; }
+  int lens(int i) const { return lenses_ + kLensSize * i; }
   int mask_bias() const { return bias_; }
   int ct_scale() const { return bias_ + 1; }
   int view(int i) const { return views_ + 8 * i; }
@@ -40,7 +40,8 @@ double SolveRig(const RigModel& rig, std::span<const std::optional<CondensedEvid
                 RigParameters& parameters);
 
 // Derivative of (motion of the camera_from_model about `pivot` in the camera frame, log focal,
-// principal point, bias) of a view by all parameters, at `parameters`: kEvidenceSize x layout.size.
+// principal point, bias, distortion) of a view by all parameters, at `parameters`: kEvidenceSize x
+// layout.size.
 Eigen::MatrixXd ViewJacobian(const RigModel& rig, const RigLayout& layout,
                              const RigParameters& parameters, int view,
                              const Eigen::Vector3d& pivot);

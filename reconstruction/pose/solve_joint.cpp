@@ -44,12 +44,13 @@ std::vector<PhotoContour> PhotoContours(std::span<const Mask> masks) {
   return photos;
 }
 
-// Focal length and principal point are freed only where the data know them better than half of
-// their prior: else they would only soak up what the model leaves out. True when one was freed.
+// Focal length, principal point and distortion are freed only where the data know them better than
+// half of their prior: else they would only soak up what the model leaves out. True when one was
+// freed.
 bool FreeWhatIsSeen(RigModel& rig, const RigPosterior& posterior) {
   bool freed = false;
   for (int lens = 0; lens < static_cast<int>(rig.lens_sigma().size()); ++lens) {
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < kLensSize; ++k) {
       const int at = posterior.layout.lens(lens) + k;
       if (std::sqrt(posterior.covariance(at, at)) >= 0.5 * posterior.prior_sigma[at]) continue;
       freed |= rig.held(lens, k);

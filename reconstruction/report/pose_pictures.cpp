@@ -11,6 +11,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/base/units.h"
+#include "reconstruction/pose/contour_evidence.h"
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/render/rasterise.h"
 
@@ -168,13 +170,17 @@ void DrawCamera(cv::Mat& picture, const ParallelView& view, const RingCamera& ca
   Text(picture, at + beside + Vector2d(-6, 4), camera.label, kInk);
 }
 
+// What moves a point's picture, of kEvidenceSize: all but the mask bias.
+constexpr std::array<int, 10> kMoving{0, 1, 2, 3, 4, 5, 6, 7, 8, 10};
+using Moving = Eigen::Matrix<double, kMoving.size(), 1>;
+
 // Picture of a point of the camera frame when pose and lens are off by `d`: w, rho, log focal
-// length, principal point.
-std::optional<Vector2d> ProjectMoved(const Vector3d& x, Intrinsics intrinsics,
-                                     const Eigen::Matrix<double, 9, 1>& d) {
+// length, principal point, distortion.
+std::optional<Vector2d> ProjectMoved(const Vector3d& x, Intrinsics intrinsics, const Moving& d) {
   const double angle = d.head<3>().norm();
   Vector3d moved = x;
   if (angle > 0) moved = Eigen::AngleAxisd(angle, d.head<3>() / angle) * x;
+  intrinsics.k1 += d[9] * K1OfCorner(intrinsics);
   intrinsics.fl_x *= std::exp(d[6]);
   intrinsics.fl_y *= std::exp(d[6]);
   intrinsics.cx += d[7];
@@ -184,15 +190,17 @@ std::optional<Vector2d> ProjectMoved(const Vector3d& x, Intrinsics intrinsics,
 
 std::optional<SurfaceEllipse> EllipseOf(const Vector3d& in_camera, const ViewPose& view,
                                         const Intrinsics& intrinsics) {
-  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
-  if (view.covariance_with_lens.rows() >= 9)
-    covariance = view.covariance_with_lens.topLeftCorner<9, 9>();
+  constexpr int kSize = kMoving.size();
+  Eigen::Matrix<double, kSize, kSize> covariance = Eigen::Matrix<double, kSize, kSize>::Zero();
+  if (view.covariance_with_lens.rows() == kEvidenceSize)
+    covariance = view.covariance_with_lens(kMoving, kMoving);
   else
     covariance.topLeftCorner<6, 6>() = view.covariance;
-  Eigen::Matrix<double, 2, 9> J;
-  for (int k = 0; k < 9; ++k) {
-    const double step = k < 3 || k == 6 ? 1e-6 : 1e-3;  // rad and relative, mm and px
-    Eigen::Matrix<double, 9, 1> d = Eigen::Matrix<double, 9, 1>::Zero();
+  Eigen::Matrix<double, 2, kSize> J;
+  for (int k = 0; k < kSize; ++k) {
+    // Radians and relative, mm and px.
+    const double step = k < 3 || k == 6 || k == 9 ? 1e-6 : 1e-3;
+    Moving d = Moving::Zero();
     d[k] = step;
     const auto ahead = ProjectMoved(in_camera, intrinsics, d);
     d[k] = -step;

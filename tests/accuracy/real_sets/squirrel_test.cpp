@@ -25,7 +25,7 @@ void ExpectCalibrated(const test::Squirrel& squirrel, const JointOptions& option
   EXPECT_LE(figures->contour.px.median, 1.2);
   ASSERT_TRUE(figures->axis_deg);
   EXPECT_LE(*figures->axis_deg, 0.4);
-  ASSERT_EQ(figures->lens.size(), 3u);
+  ASSERT_EQ(figures->lens.size(), 4u);
   for (const MovedParameter& p : figures->lens) {
     EXPECT_GT(p.sigma, 0) << p.name;
     EXPECT_LE(std::abs(p.moved), 3 * p.sigma) << p.name;

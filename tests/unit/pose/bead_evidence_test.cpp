@@ -7,6 +7,7 @@
 #include "drivers/base/units.h"
 #include "pose_scene.h"
 #include "reconstruction/pose/bead_solve.h"
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/rigid_motion.h"
 
 namespace scan {
@@ -35,6 +36,7 @@ class BeadCost final : public ceres::SizedCostFunction<2, kEvidenceSize> {
     state.intrinsics.cx += v[7];
     state.intrinsics.cy += v[8];
     state.mask_bias_px += v[9];
+    state.intrinsics.k1 += v[10] * K1OfCorner(state_.intrinsics);
     BeadDerivative dr;
     // The derivative is by a motion from here, which at y = 0 is y itself.
     Eigen::Map<Eigen::Vector2d>(residuals, 2) = BeadResidual(state, Sighting(), pivot_, &dr);

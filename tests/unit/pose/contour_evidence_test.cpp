@@ -4,6 +4,7 @@
 
 #include "drivers/base/units.h"
 #include "pose_scene.h"
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/rigid_motion.h"
 
 namespace scan {
@@ -20,6 +21,7 @@ ViewState SomeState() {
 // The state after a small change of what a residual depends on.
 ViewState Changed(ViewState state, const EvidenceVector& y, const Eigen::Vector3d& pivot) {
   state.camera_from_model = MovedAbout(state.camera_from_model, Vector6d(y.head<6>()), pivot);
+  state.intrinsics.k1 += y[10] * K1OfCorner(state.intrinsics);
   state.intrinsics.fl_x *= std::exp(y[6]);
   state.intrinsics.fl_y *= std::exp(y[6]);
   state.intrinsics.cx += y[7];
@@ -35,7 +37,7 @@ TEST(ContourResidual, DerivativeAgreesWithDifferences) {
   EvidenceVector analytic;
   ContourResidual(state, point, target, normal, pivot, &analytic);
   for (int k = 0; k < kEvidenceSize; ++k) {
-    const double h = k < 3 || k == 6 ? 1e-6 : 1e-3;
+    const double h = k < 3 || k == 6 || k == 10 ? 1e-6 : 1e-3;
     const EvidenceVector step = h * EvidenceVector::Unit(k);
     const double up =
         ContourResidual(Changed(state, step, pivot), point, target, normal, pivot, nullptr);

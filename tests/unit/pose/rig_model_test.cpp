@@ -72,6 +72,14 @@ TEST(RigModel, ASplitThatIsTakenBackLeavesNothing) {
   }
 }
 
+TEST(RigModel, DistortionIsThatOfThePicturesCorner) {
+  Rigged r = SomeRig();
+  r.parameters.lenses[0] = {0, 0, 0, 0.01};
+  Intrinsics in = r.rig.IntrinsicsOf(r.parameters, 0);
+  const Eigen::Vector2d corner(0.5 * in.w / in.fl_x, 0.5 * in.h / in.fl_y);
+  EXPECT_LT((Distort(in, corner) - 1.01 * corner).norm(), 1e-12);
+}
+
 TEST(RigModel, CtScaleIsDividedOutOfTheTranslation) {
   Rigged r = SomeRig();
   r.parameters.log_ct_scale = 0;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pose_scene.h"
+#include "reconstruction/pose/lens_distortion.h"
 #include "reconstruction/pose/score.h"
 
 namespace scan {
@@ -65,6 +66,33 @@ TEST(SolveJoint, TheBiasOfDilatedMasksIsFound) {
   const SharedEstimate bias = poses->nuisances.at("mask_bias_px");
   EXPECT_GT(bias.value, 0.9);
   EXPECT_LT(bias.value, 1.5);
+}
+
+// A lens whose distortion is not as stated, the specimen filling its picture: seen, and so freed.
+TEST(SolveJoint, DistortionThatTheOutlinesShowIsFound) {
+  const TriangleMesh mesh = test::BugMesh(3);
+  test::SceneOptions options = kSmall;
+  options.focal_mm = 260;
+  options.views = 24;
+  test::Scene scene = test::MakeScene(mesh, SomePlacing(), options);
+  for (LensState& lens : scene.photos.lens_states) lens.sigma.fl_rel = 0.01;
+  constexpr double kAtCorner = 0.004;
+  double k1 = 0;
+  for (std::size_t i = 0; i < scene.masks.size(); ++i) {
+    Intrinsics& in = scene.true_intrinsics[i];
+    k1 = in.k1 = kAtCorner * K1OfCorner(in);
+    scene.masks[i] = test::RenderMask(mesh, scene.truth[i], in);
+  }
+  const auto poses = SolveJoint(mesh, scene.photos, scene.masks, NearPlacing());
+  ASSERT_TRUE(poses) << ToString(poses.error());
+  for (const auto& [id, lens] : poses->lens_states) {
+    const SharedEstimate& found = lens.parameters.at("k1");
+    EXPECT_LT(found.sigma, 0.5 * found.prior_sigma) << id;
+    EXPECT_NEAR(found.value, k1, 0.2 * k1) << id;
+    EXPECT_EQ(lens.intrinsics.k1, found.value) << id;
+  }
+  for (std::size_t i = 0; i < poses->views.size(); ++i)
+    EXPECT_LT(ErrorOf(mesh, scene, *poses, i).surface_median_px, 0.3) << i;
 }
 
 TEST(SolveJoint, SameBytesForAnyNumberOfThreads) {

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/base/units.h"
+#include "reconstruction/pose/contour_evidence.h"
 
 namespace scan {
 namespace {
@@ -139,7 +140,7 @@ TEST(SurfaceEllipses, AreThePictureOfThePosesCovariance) {
     EXPECT_LT((e.centre_px - Vector2d(300, 200)).cwiseAbs().maxCoeff(), 1000 * 10 / 190.0 + 3);
   }
   // Focal length of 1 %: outward, in proportion to the distance from the principal point.
-  seen.view.covariance_with_lens = Eigen::MatrixXd::Zero(10, 10);
+  seen.view.covariance_with_lens = Eigen::MatrixXd::Zero(kEvidenceSize, kEvidenceSize);
   seen.view.covariance_with_lens(6, 6) = 1e-4;
   for (const SurfaceEllipse& e : SurfaceEllipses(Box(10), seen.view, seen.intrinsics, 6)) {
     const Vector2d outward = 0.01 * (e.centre_px - Vector2d(300, 200));
