@@ -44,6 +44,7 @@ struct EvaluateOptions {
   bool full_size = false;
   Fig12Options fig12;  // its noise and seed are those of drawn masks, too
   double focal_error_percent = 0, logged_sigma_deg = 0, logged_sigma_mm = 0;
+  double surface_off_mm = 0;
   double wrong_px = 5;
   std::size_t paper_faces = 12000;
   bool per_view = false;
@@ -253,6 +254,7 @@ Result<Capture> CaptureIn(const DemoPaths& paths, const EvaluateOptions& options
   SCAN_TRY(SurfaceResult surface,
            ExtractSurface(*capture.volume, {}, context.progress, context.stop));
   trial.mesh = std::move(surface.mesh);
+  if (options.surface_off_mm != 0) OffsetMesh(trial, options.surface_off_mm);
   if (options.beads) {
     FiducialOptions fiducials;
     fiducials.bead_mm = 1.0;
@@ -284,6 +286,8 @@ Result<PoseTrial> Fig12Trial(const EvaluateOptions& options) {
 Result<Capture> MakeCapture(const EvaluateOptions& options, const CliContext& context) {
   if (options.is_fig12()) {
     SCAN_TRY(PoseTrial trial, Fig12Trial(options));
+    StateErrors(trial, {.focal_error_rel = options.focal_error_percent / 100});
+    if (options.surface_off_mm != 0) OffsetMesh(trial, options.surface_off_mm);
     return Capture{std::move(trial), {}, {}, {}};
   }
   if (options.was_captured()) return CaptureIn(DemoPathsIn(options.from), options, context);
@@ -322,8 +326,10 @@ std::string ProtocolText(const EvaluateOptions& options, const PoseTrial& trial)
                         noise.binary ? ", binary masks" : "");
   if (!options.is_fig12() && options.draws_masks())
     text += "masks drawn from the exact surface at the true cameras\n";
-  if (!options.is_fig12() && options.focal_error_percent != 0)
+  if (options.focal_error_percent != 0)
     text += fmt::format("stated focal length off by {:g} %\n", options.focal_error_percent);
+  if (options.surface_off_mm != 0)
+    text += fmt::format("mesh outside of the surface by {:g} mm\n", options.surface_off_mm);
   if (options.with_paper())
     text += fmt::format(
         "paper: {} directions x {} distances x {} angles, {} chains x {} steps, gate {}, mesh of "
@@ -365,8 +371,8 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
   if (options.is_fig12() && options.beads)
     return BadInput("the protocol of Fig 12 has no beads", "--beads", "leave out --preset fig12");
   if (options.is_fig12()) {
-    // Exact masks: no bias is looked for.
-    if (options.fig12.noise.bias_px == 0)
+    // Exact masks of an exact mesh: no bias is looked for.
+    if (options.fig12.noise.bias_px == 0 && options.surface_off_mm == 0)
       options.joint.rig.mask_bias_px = 0.02 * 1848 / options.photo_width();
     // The mesh is the truth: residuals hang together as far as the masks' errors do, and no more.
     constexpr double kLeastCorrelationPx = 2;
@@ -404,12 +410,17 @@ Result<CommandOutput> RunEvaluate(EvaluateOptions& options, const CliContext& co
       text};
 }
 
-// Of the simulated station: what is told to the solvers beside what is true.
+// What is told to the solvers beside what is true.
 void AddStatedErrors(CLI::App& command, EvaluateOptions& options) {
   command
       .add_option("--focal-error-percent", options.focal_error_percent,
-                  "demo: the stated focal length is longer by this; its sigma grows by as much")
+                  "the stated focal length is longer by this; its sigma grows by as much")
       ->check(CLI::Range(-50.0, 50.0))
+      ->capture_default_str();
+  command
+      .add_option("--surface-off-mm", options.surface_off_mm,
+                  "the mesh lies outside of the surface by this: a CT threshold too low")
+      ->check(CLI::Range(-5.0, 5.0))
       ->capture_default_str();
   command
       .add_option("--logged-sigma-deg", options.logged_sigma_deg,

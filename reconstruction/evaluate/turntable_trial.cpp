@@ -32,6 +32,12 @@ void StateErrors(PoseTrial& trial, const TurntableErrors& errors) {
   }
 }
 
+void OffsetMesh(PoseTrial& trial, double outwards_mm) {
+  const std::vector<Eigen::Vector3d> normals = VertexNormals(trial.mesh);
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    trial.mesh.vertices[i] += outwards_mm * normals[i];
+}
+
 void DrawMasks(PoseTrial& trial, const DrawnMaskOptions& options) {
   trial.masks.assign(trial.truth.size(), {});
   tbb::parallel_for(std::size_t{0}, trial.masks.size(), [&](std::size_t i) {

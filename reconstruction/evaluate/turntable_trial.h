@@ -1,5 +1,5 @@
-// A session whose true cameras are known, made harder: masks with stated errors, a wrong focal
-// length, other pictures' sizes.
+// Photographs whose true cameras are known, made harder: masks with stated errors, a wrong focal
+// length, a mesh of another CT threshold, other pictures' sizes.
 #pragma once
 
 #include "reconstruction/evaluate/drawn_mask.h"
@@ -16,6 +16,10 @@ struct TurntableErrors {
 // Changes the size of the photographs in stated and true cameras, and what is stated of focal
 // length and logged axes. When the size changes the masks no longer fit: DrawMasks.
 void StateErrors(PoseTrial& trial, const TurntableErrors& errors);
+
+// Moves the solvers' mesh, not the true surface, outwards along its normals, as a CT threshold that
+// is too low does; inwards where negative.
+void OffsetMesh(PoseTrial& trial, double outwards_mm);
 
 // Every photograph's mask drawn anew from `trial.surface` at its true camera. Same bytes for any
 // number of threads.

@@ -53,6 +53,16 @@ TEST(TurntableTrial, ALargerPictureShowsTheSame) {
   }
 }
 
+TEST(TurntableTrial, AMeshOfAnotherThresholdLiesOutsideOfTheSurface) {
+  PoseTrial trial = SceneTrial();
+  trial.mesh = trial.surface = test::RevolutionMesh(60, {0, 0, 1});
+  const double volume = SignedVolume(trial.mesh);
+  OffsetMesh(trial, 0.1);
+  // Area of a body this round, about 4 pi 11^2.
+  EXPECT_NEAR((SignedVolume(trial.mesh) - volume) / (0.1 * 4 * kPi * 11 * 11), 1, 0.2);
+  EXPECT_DOUBLE_EQ(SignedVolume(trial.surface), volume);
+}
+
 TEST(TurntableTrial, OnlyWhatIsStatedGoesWrong) {
   const PoseTrial captured = SceneTrial();
   PoseTrial wrong = captured;
