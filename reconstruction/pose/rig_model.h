@@ -32,7 +32,7 @@ struct RigPriors {
   double axis_tilt_rad =
       0.5 * kPi / 180;  // turntable axis against the lift, each of two components
   double axis_shift_mm = 0.5;
-  double mask_bias_px = 0.35;  // outward positive
+  double mask_bias_px = 0.35;  // of the photographs; outward positive
   double ct_scale_rel = 1e-4;
   double mounting_rotation_rad = 1.0;  // about the start; wide, keeps every direction finite
   double mounting_translation_mm = 100;

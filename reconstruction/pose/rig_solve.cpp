@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <span>
 
 #include "reconstruction/pose/lens_distortion.h"
@@ -45,9 +46,9 @@ using ViewMotionFunction =
 constexpr std::array<int, 8> kBlockSizes{6, 1, 6, 4, kLensSize, 8, 1, 1};
 
 // A view's evidence: r = A (y - y0) + b with A' A = H and A' b = g, and for each place whose
-// discrepancy d other views see too  sqrt(D) d + (C' (y - y0) + g) / sqrt(D), H and g then without
-// what CondensedEvidence has them take the place for. After the blocks of the view's motion one of
-// size 1 for each of those places.
+// discrepancy d other views see too  sqrt(D) d + (C' (y - y0) + g) / sqrt(D). Such a place is no
+// longer minimised over in H and g, and they lose what its own residual says. After the blocks of
+// the view's motion one of size 1 for each of those places.
 class EvidenceCost final : public ceres::CostFunction {
  public:
   EvidenceCost(const ViewMotion& motion, const EvidenceVector& y0,
@@ -88,7 +89,7 @@ class EvidenceCost final : public ceres::CostFunction {
 
   bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    constexpr int kMotionSize = 31;  // sum of kBlockSizes
+    constexpr int kMotionSize = std::accumulate(kBlockSizes.begin(), kBlockSizes.end(), 0);
     std::array<double, kEvidenceSize * kMotionSize> storage{};
     std::array<double*, kBlockSizes.size()> dy{};
     for (std::size_t k = 0, offset = 0; k < dy.size(); offset += kBlockSizes[k++])

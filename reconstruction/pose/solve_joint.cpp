@@ -4,10 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 
 #include "reconstruction/pose/found_turntable.h"
 #include "reconstruction/pose/joint_result.h"
+#include "reconstruction/pose/mirror_image.h"
 #include "reconstruction/pose/nominal_pose.h"
 #include "reconstruction/pose/observability.h"
 #include "reconstruction/pose/outline_distance.h"
@@ -394,6 +396,31 @@ std::vector<Judgement> Settle(const Evidence& in, RigAttempt& attempt,
   return judgements;
 }
 
+// Without any logged pose that holds, views could as well be of the mesh's mirror image: rejects
+// them where they are. Returns what the report says where the outlines cannot tell.
+std::string JudgeMirrorImage(const Evidence& in, const RigAttempt& attempt,
+                             std::vector<Judgement>& judgements) {
+  const RigModel& rig = attempt.rig;
+  const RefineResult& fit = attempt.fit;
+  std::vector<PosedView> views;
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    if (!judgements[i].reason.empty()) continue;
+    if (rig.views()[i].logged) return {};
+    views.push_back(
+        {&in.photos[i],
+         {rig.CameraFromModelOf(fit.parameters, static_cast<int>(i)),
+          rig.IntrinsicsOf(fit.parameters, rig.views()[i].lens), fit.parameters.mask_bias_px}});
+  }
+  if (views.empty()) return {};
+  RefineOptions refine = in.refine;
+  refine.correlation_floor_px = fit.correlation.along_px;
+  const MirrorComparison comparison = CompareWithMirrorImage(in.mesh, views, refine);
+  const std::string reason = MirrorReason(comparison);
+  for (Judgement& judgement : judgements)
+    if (judgement.reason.empty()) judgement.reason = reason;
+  return MirrorNote(comparison);
+}
+
 // Everything that the result says of a solve.
 Poses Conclude(const Evidence& in, const PhotoSet& photos, std::span<const Mask> masks,
                const RigAttempt& attempt, std::span<const Judgement> judgements) {
@@ -455,13 +482,15 @@ Result<Poses> Solve(const TriangleMesh& mesh, const PhotoSet& photos, std::span<
   AllowForBends(in, attempt, bent, stop);
   const Evidence settled{bent.contours ? *bent.contours : contour_mesh, contours, options,
                          in.refine, scale};
-  const std::vector<Judgement> judgements = Settle(settled, attempt, stop);
+  std::vector<Judgement> judgements = Settle(settled, attempt, stop);
+  const std::string mirror_note = JudgeMirrorImage(settled, attempt, judgements);
   if (stop.stop_requested()) return Cancelled("pose");
   Report(progress, "poses: uncertainty", 0.9);
   Poses poses = Conclude(settled, photos, masks, attempt, judgements);
   poses.notes.insert(poses.notes.end(), beads.notes.begin(), beads.notes.end());
   if (beads.sightings > 0) poses.nuisances["bead_residual_px"].value = beads.residual_px;
   for (const BentPart& part : bent.parts) poses.notes.push_back(BentPartNote(part));
+  if (!mirror_note.empty()) poses.notes.push_back(mirror_note);
   for (std::size_t i = 0; i < alternatives.size(); ++i)
     poses.views[i].alternatives = alternatives[i];
   return poses;
@@ -494,6 +523,8 @@ Result<Poses> SolveOnFoundTurntable(const TriangleMesh& mesh, const PhotoSet& ph
       fmt::format("The poses of {} of {} views, each found alone, are those of one camera before a "
                   "specimen that turns about one axis: they were solved together as such.",
                   found->views, photos.photos.size()));
+  std::copy_if(alone.notes.begin(), alone.notes.end(), std::back_inserter(together.notes),
+               IsMirrorNote);
   return together;
 }
 

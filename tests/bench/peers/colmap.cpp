@@ -42,7 +42,7 @@ double ChildSeconds() {
 
 bool Colmap(const fs::path& folder, const std::string& arguments) {
   const std::string command = fmt::format(
-      "cd '{}' && QT_QPA_PLATFORM=offscreen colmap {} >> log 2>&1", folder.string(), arguments);
+      "cd '{}' && QT_QPA_PLATFORM=offscreen timeout 600 colmap {} >> log 2>&1", folder.string(), arguments);
   return std::system(command.c_str()) == 0;
 }
 

@@ -43,6 +43,37 @@ TEST(WrongInput, AMeshOfAnotherScale) {
   }
 }
 
+// Photographs without logged poses, which each look much like the mirror image's from behind.
+Result<Poses> MirroredWithoutPoses(int w, bool mirror) {
+  const TriangleMesh mesh = test::BugMesh(2);
+  test::SceneOptions options;
+  options.w = w;
+  options.h = static_cast<int>(std::lround(w * 612.0 / 924));
+  options.views = 4;
+  const test::Scene scene = test::MakeScene(
+      mesh, TableFromModel(ExpSo3({0.1, 0.2, 0.5}), Eigen::Vector3d(2, 1, 3)), options);
+  TriangleMesh given = mesh;
+  if (mirror) {
+    for (auto& v : given.vertices) v.y() = -v.y();
+    for (auto& f : given.faces) std::swap(f[1], f[2]);
+  }
+  JointOptions joint = FewerDirections();
+  joint.no_priors = true;
+  return SolveJoint(given, scene.photos, scene.masks, joint);
+}
+
+TEST(WrongInput, AMirroredMeshWithoutLoggedPoses) {
+  for (const int w : {462, 1848, 3696})
+    ExpectAllRejected(MirroredWithoutPoses(w, true), "mirrored, " + std::to_string(w),
+                      "mirror image");
+  for (const int w : {462, 1848}) {
+    const auto poses = MirroredWithoutPoses(w, false);
+    ASSERT_TRUE(poses) << ToString(poses.error());
+    for (const ViewPose& view : poses->views)
+      EXPECT_EQ(view.status, ViewStatus::accepted) << view.reason;
+  }
+}
+
 TEST(WrongInput, AFocalLengthTwiceOrHalfOfTheTrueOne) {
   const TriangleMesh mesh = test::BugMesh(2);
   for (const double factor : {0.5, 2.0}) {
